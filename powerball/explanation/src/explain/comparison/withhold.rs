@@ -1,6 +1,6 @@
 //! Names that are taken back: they turn out not to be told apart or not to be there.
 //!
-//! Also here: whether an effect is there at every pace and in both halves of the logs.
+//! Also here: whether an effect is there at every pace.
 
 use super::super::model::{Accepted, Model};
 use super::super::study::Study;
@@ -21,16 +21,13 @@ pub(crate) struct Withheld {
 }
 
 /// Takes back what, now that everything that fits is in the model, is not what it is called: an effect
-/// that is missing at some pace or in half of the logs; or one that is not told apart from its rivals and beside which much is
+/// that is missing at some pace; or one that is not told apart from its rivals and beside which much is
 /// left, so that something else is there. It stays as a rival of what comes.
 pub(crate) fn withhold(study: &Study<'_>, model: &mut Model, history: &mut History) -> Option<Withheld> {
     let (taken, why) = if let Some(a) = impossible(study, model) {
         (vec![model.accepted.remove(a)], IMPOSSIBLE)
     } else if let Some(a) = inconstant(study, model) {
-        (
-            vec![model.accepted.remove(a)],
-            "it is not there at every pace of motion and in both halves of the logs",
-        )
+        (vec![model.accepted.remove(a)], "what it says of some pace of motion is not there")
     } else if let Some(a) = harmful(study, model) {
         (vec![model.accepted.remove(a)], HARMS)
     } else {
@@ -145,13 +142,13 @@ pub(crate) fn leftover(before: &[f64], after: &[f64], floor: &[f64], joints: &[J
     if old > 0.0 { (excess(after) / old).min(1.0) } else { 0.0 }
 }
 
-// Whether an effect is there at every pace and in both halves of the logs. A name that is not the truth is fitted where
-// most of the truth is, in slow motion say; in faster motion what the same law says is then not there. (Tests of constant
-// parameters, after Chow 1960; here over octaves of time as well as over periods.)
+// Whether an effect is there at every pace. A name that is not the truth is fitted where most of the truth
+// is, in slow motion say; in faster motion what the same law says is then not there. (Tests of constant
+// parameters, after Chow 1960; here over octaves of time in the place of periods.)
 
-/// How much larger or smaller an effect is in a part of the data than over all, as a share, and the standard error of
-/// that.
-type ChangeOfSize = (f64, f64);
+/// By octave, fast to slow: how much larger or smaller the effect is there than over all, as a share, and the
+/// standard error of that.
+type ByOctave = [(f64, f64); OCTAVES];
 
 /// What a signal holds by octave. An odd end is left out: by itself it tells fast from slow no more.
 fn octaves(signal: &[f64]) -> [Vec<f64>; OCTAVES] {
@@ -166,52 +163,24 @@ fn octaves(signal: &[f64]) -> [Vec<f64>; OCTAVES] {
     })
 }
 
-/// The last accepted effect of which surely most is missing in some octave or in one half of the logs. Everything that
-/// fits must be in the model: what else is missing is seen as a change of size too. (A change by more than the effect
+/// The last accepted effect of which surely most is missing in some octave. Everything that fits must be
+/// in the model: what else is missing is seen as a change of size too. (A change by more than the effect
 /// itself is not its own.)
 pub(crate) fn inconstant(study: &Study<'_>, model: &Model) -> Option<usize> {
     let rule = study.rule();
     let NormalEquations { gram, .. } = model.fit.normal_equations();
-    let half = study.folds.cells / 2;
-    let halves =
-        [true, false].map(|first| model.fit.gram.fitted(&model.fit.weights, |cell| (cell < half) == first));
-    let missing = |(change, error): &ChangeOfSize| {
+    let sizes: Vec<ByOctave> =
+        model.places().into_iter().map(|own| by_octave(study, model, &gram, own)).collect();
+    let missing = |(change, error): &(f64, f64)| {
         let least = rule.least_missing.max(rule.missing_errors * error);
         (least..2.0 - rule.least_missing).contains(&-change)
     };
-    let places = model.places();
-    let at_some_pace = |a: usize| by_octave(study, model, &gram, places[a].clone()).iter().any(missing);
-    // What has windows is in some logs only.
-    let in_one_half = |a: usize| {
-        let everywhere = model.accepted[a].candidate.windows.is_empty();
-        everywhere && halves.iter().any(|half| missing(&in_part(model, half, places[a].clone())))
-    };
     let judged = |a: &usize| !model.accepted[*a].is_baseline() && !model.accepted[*a].effect().abrupt();
-    (0..places.len()).rev().filter(judged).find(|a| at_some_pace(*a) || in_one_half(*a))
-}
-
-/// An effect's size in a part of the data with these normal equations, everything else refitted there. `own` are the
-/// places of its columns.
-fn in_part(model: &Model, part: &NormalEquations, own: Range<usize>) -> ChangeOfSize {
-    let fit = &model.fit;
-    let along = |values: &[f64]| -> f64 { own.clone().map(|c| values[c] * fit.theta[c]).sum() };
-    let products: Vec<f64> = (0..part.right.len()).map(|c| along(part.gram.col_as_slice(c))).collect();
-    let others = Solver::new(&part.gram, |c| fit.free[c] && !own.contains(&c));
-    let [taken, right] = [&products, &part.right].map(|values| others.whitened(values));
-    let square = along(&products) - dot(&taken, &taken);
-    if square <= 0.0 {
-        return (0.0, f64::INFINITY);
-    }
-    ((along(&part.right) - dot(&taken, &right)) / square - 1.0, 1.0 / square.sqrt())
+    (0..sizes.len()).rev().filter(judged).find(|a| sizes[*a].iter().any(missing))
 }
 
 /// An effect's size by octave, everything else refitted. `own` are the places of its columns.
-fn by_octave(
-    study: &Study<'_>,
-    model: &Model,
-    gram: &Mat<f64>,
-    own: Range<usize>,
-) -> [ChangeOfSize; OCTAVES] {
+fn by_octave(study: &Study<'_>, model: &Model, gram: &Mat<f64>, own: Range<usize>) -> ByOctave {
     let fit = &model.fit;
     let others = Solver::new(gram, |c| fit.free[c] && !own.contains(&c));
     let mut alone = vec![0.0; fit.design.size];

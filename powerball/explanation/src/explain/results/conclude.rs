@@ -34,13 +34,13 @@ pub(crate) fn conclude(findings: Findings<'_>) -> Result<Explained, ExplainError
     };
     let Composed { model: torque_model, arm, held, fitted, held_out } = composed;
     let arm = arm.as_ref().unwrap_or(findings.study.data.body);
-    let at_rest = pushes_at_rest(&findings.study, (&torque_model, arm), &held);
     let (study, model, history) = (&findings.study, &findings.model, &findings.history);
     let before = &findings.initial_fit;
     let after = FitErrors {
         fit: residual_stats(&study.data, &fitted),
         validate: residual_stats(&study.validation, &held_out),
     };
+    let at_rest = pushes_at_rest(study, (&torque_model, arm), &held, &after.validate.rms);
     let floor = noise_floor(&study.data);
     let left = |joints: &[JointNumber]| leftover(&before.errors.fit.rms, &after.fit.rms, &floor, joints);
     let mut named: Vec<NamedEffect> = validation_only.iter().map(|effect| effect.named.clone()).collect();

@@ -48,11 +48,9 @@ const SHORTEST: f64 = 0.2;
 const ENOUGH_REST: f64 = 5.0;
 /// … as the value that this share of them does not exceed …
 const USUAL: f64 = 0.995;
-/// … with this margin …
-const MARGIN: f64 = 1.25;
-/// … and is else so many times Coulomb friction, beyond which undisturbed joints stick in no measured log.
+/// … and is otherwise this multiple of Coulomb friction, beyond which undisturbed joints stick in no measured log.
 const STICKS: f64 = 3.0;
-/// Beyond that, in standard deviations of the torque at rest.
+/// Beyond that and the model's own error, in standard deviations of the torque at rest.
 const DEVIATIONS: f64 = 6.0;
 /// N·m: what divides by noise has some.
 const LEAST_NOISE: f64 = 1e-9;
@@ -72,18 +70,21 @@ const ROUNDS: usize = 2;
 /// The pushes in all logs, those that were fitted first.
 ///
 /// `arm` is the arm with the changes of `model`, and the last link holds the model's payload during the windows `held`
-/// of the fitted logs and of the validation set.
+/// of the fitted logs and of the validation set. `errors` are what the model leaves of the latter, rms by joint.
 pub(crate) fn pushes_at_rest(
     study: &Study<'_>,
     (model, arm): (&TorqueModel, &RigidArm),
     held: &[Vec<Window>; 2],
+    errors: &[f64],
 ) -> Vec<RestPush> {
     let sets = [&study.data, &study.validation];
-    let friction: Vec<f64> = model.gammas().iter().map(|g| g[0].abs() + g[2].abs()).collect();
+    let friction = model.gammas().into_iter().map(|g| g[0].abs() + g[2].abs());
+    let joints: Vec<Usual> =
+        friction.zip(errors).map(|(friction, error)| Usual { friction, error: *error }).collect();
     let [mut fitted, judged] = [0, 1].map(|k| rests(sets[k], (model, arm), &held[k]));
     // A push in one log hides those of others until it is known.
     for _ in 0..ROUNDS {
-        let found = pushed(&fitted, None, &friction);
+        let found = pushed(&fitted, None, &joints);
         let runs: Vec<Vec<Range<usize>>> = found.into_iter().flat_map(|(_, runs)| runs).collect();
         for (rest, runs) in fitted.iter_mut().zip(runs) {
             rest.calm = (0..rest.samples.len()).map(|k| !runs.iter().any(|run| run.contains(&k))).collect();
@@ -96,8 +97,8 @@ pub(crate) fn pushes_at_rest(
         };
         own.iter().zip(each).flat_map(of).collect::<Vec<_>>()
     };
-    let in_fitted = pushes(0, &fitted, pushed(&fitted, None, &friction));
-    let in_judged = pushes(1, &judged, pushed(&judged, Some(&fitted), &friction));
+    let in_fitted = pushes(0, &fitted, pushed(&fitted, None, &joints));
+    let in_judged = pushes(1, &judged, pushed(&judged, Some(&fitted), &joints));
     in_fitted.into_iter().chain(in_judged).collect()
 }
 
@@ -106,7 +107,7 @@ pub(crate) fn pushes_at_rest(
 fn pushed(
     rests: &[Rest<'_>],
     fitted: Option<&[Rest<'_>]>,
-    friction: &[f64],
+    joints: &[Usual],
 ) -> Vec<(Limits, Vec<Vec<Range<usize>>>)> {
     let of = |own: &[Rest<'_>]| {
         let log = own[0].recording.log;
@@ -114,7 +115,7 @@ fn pushed(
             Some(fitted) => fitted.iter().collect(),
             None => rests.iter().filter(|rest| rest.recording.log != log).collect(),
         };
-        let limits = Limits::new(friction, &others, own);
+        let limits = Limits::new(joints, &others, own);
         let mut runs: Vec<Vec<Range<usize>>> = own.iter().map(|rest| rest.pushed(&limits)).collect();
         let pushed: usize = runs.iter().flatten().map(Range::len).sum();
         let all: usize = own.iter().map(|rest| rest.samples.len()).sum();
@@ -126,6 +127,14 @@ fn pushed(
     rests.chunk_by(|a, b| a.recording.log == b.recording.log).map(of).collect()
 }
 
+/// What a joint's torque may be off by where nothing touches the arm, N·m.
+struct Usual {
+    /// Coulomb friction.
+    friction: f64,
+    /// The model's error in motion on logs that were not fitted, rms: a pose may be new to it.
+    error: f64,
+}
+
 /// How far the torque of each joint at rest may be from the model's, N·m.
 struct Limits {
     limit: Vec<f64>,
@@ -134,27 +143,28 @@ struct Limits {
 }
 
 impl Limits {
-    fn new(friction: &[f64], others: &[&Rest<'_>], own: &[Rest<'_>]) -> Limits {
+    fn new(joints: &[Usual], others: &[&Rest<'_>], own: &[Rest<'_>]) -> Limits {
         let seconds: f64 = others.iter().map(|rest| rest.calm_seconds()).sum();
         // A median over rests, most of which nobody touches.
         let noise = |j: usize| {
             let mut all: Vec<f64> = others.iter().copied().chain(own).map(|rest| rest.noise(j)).collect();
             median(&mut all)
         };
-        let noise: Vec<f64> = (0..friction.len()).map(noise).collect();
+        let noise: Vec<f64> = (0..joints.len()).map(noise).collect();
         let limit = |j: usize| {
+            let Usual { friction, error } = joints[j];
             let usual = match seconds >= ENOUGH_REST {
                 true => {
                     let mut sizes: Vec<f64> = others.iter().flat_map(|rest| rest.calm_sizes(j)).collect();
                     let k = ((sizes.len() - 1) as f64 * USUAL) as usize;
                     let (_, usual, _) = sizes.select_nth_unstable_by(k, f64::total_cmp);
-                    MARGIN * usual.max(friction[j])
+                    usual.max(friction)
                 }
-                false => STICKS * friction[j],
+                false => STICKS * friction,
             };
-            usual + DEVIATIONS * noise[j]
+            usual + error + DEVIATIONS * noise[j]
         };
-        Limits { limit: (0..friction.len()).map(limit).collect(), noise }
+        Limits { limit: (0..joints.len()).map(limit).collect(), noise }
     }
 }
 
