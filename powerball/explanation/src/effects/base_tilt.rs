@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// that its products with the tilt are columns of their own ([`Settings::unshown`]).
 pub(super) struct BaseTilt;
 
-/// What is fitted beside the tilt.
+/// What is fitted in addition to the tilt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// Whether the parameters that level gravity does not show are fitted too
