@@ -99,7 +99,7 @@ fn equal_arms_are_equal_and_five_per_cent_of_viscous_friction_is_seen() {
 }
 
 #[test]
-fn a_payload_is_told_with_its_mass() {
+fn a_payload_is_reported_with_its_mass() {
     let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
     let a = usual();
     let mut links = lwa4p::links();
@@ -129,7 +129,7 @@ fn what_varies_within_a_log_is_no_difference_of_arms() {
 }
 
 #[test]
-fn what_cannot_be_compared_is_told() {
+fn what_cannot_be_compared_is_reported() {
     let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
     let a = usual();
     let mut other = a.clone();
