@@ -76,7 +76,9 @@ fn an_arm_file_in_another_unit_makes_a_result_useless() {
             assert_eq!(code(&done) == 3, reason.is_some(), "{command}: {first} {}", said(&done));
             // A comparison says of which side, and `identify` of that side says how.
             let sentence = match command.starts_with("compare") {
-                true => reason.map(|_| "a.csv: the columns or the arm file are not what they are said to be"),
+                true => {
+                    reason.map(|_| "a.csv: the columns or the arm file are not what they are declared to be")
+                }
                 false => reason,
             };
             assert!(sentence.is_none_or(|sentence| first.contains(sentence)), "{command}: {first}");

@@ -106,12 +106,12 @@ fn a_result_that_should_not_be_built_on_ends_with_3() {
     let doubtful = identify(&reversed);
     assert_eq!(doubtful.status.code(), Some(3));
     assert!(
-        said(&doubtful).starts_with("The columns are not what they are said to be."),
+        said(&doubtful).starts_with("The columns are not what they are declared to be."),
         "{}",
         said(&doubtful)
     );
     let reason = String::from_utf8_lossy(&doubtful.stderr);
-    assert!(reason.contains("not what they are said to be") && reason.contains("--accept"), "{reason}");
+    assert!(reason.contains("not what they are declared to be") && reason.contains("--accept"), "{reason}");
     assert!(Path::new(out).join("identified.json").is_file());
 
     let accepted = identify(&[&reversed[..], &["--accept", "--quiet"]].concat());

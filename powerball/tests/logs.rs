@@ -350,7 +350,7 @@ fn torques_on_the_motors_side_are_kept_beside() {
     let dq2 = log.t.iter().map(|t| -3.0 * (3.0 * t).sin());
     assert!(motor[0].iter().zip(dq2).all(|(motor, dq2)| (motor - dq2).abs() < 1e-9));
     let told = findings.iter().map(ToString::to_string).collect::<String>();
-    assert!(told.contains("motor: kept beside the torques"), "{told}");
+    assert!(told.contains("motor: kept in addition to the torques"), "{told}");
 }
 
 fn powerball(arguments: &[&str]) -> Output {

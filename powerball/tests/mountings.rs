@@ -111,7 +111,10 @@ fn logs_of_two_mountings_come_to_one_model() {
     )));
     let warnings: Vec<&str> =
         wrong["warnings"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
-    assert!(warnings.iter().any(|w| w.contains("is the mounting of each log told right")), "{warnings:?}");
+    assert!(
+        warnings.iter().any(|w| w.contains("is the mounting of each log stated correctly")),
+        "{warnings:?}"
+    );
     for (rest, reason) in [
         (
             format!("identify --log {up} --mounting 0,90 --log {summary}"),

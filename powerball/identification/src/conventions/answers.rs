@@ -166,8 +166,8 @@ fn arm_file(facts: &Facts<'_>) -> Answer {
         return plain("arm file", None, why.into());
     }
     if good {
-        let fits = "No other convention and no other sign of an a, d or alpha fits clearly better; where a joint's error is \
-            more than 25 %, no quarter turn of theta and no other direction of gravity does.";
+        let fits = "No other convention and no other sign of an a, d or alpha fits clearly better; where a \
+            joint's error is more than 25 %, no quarter turn of theta and no other direction of gravity does.";
         return plain("arm file", Some(true), fits.into());
     }
     plain(

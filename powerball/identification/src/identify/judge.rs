@@ -143,8 +143,8 @@ fn errors(
         let joints: Vec<String> = joints.iter().map(ToString::to_string).collect();
         warnings.push(format!(
             "one set of parameters leaves more than twice as much of the logs with the base {} on joint {} \
-                as a set of their own: is the mounting of each log stated correctly, and was it one arm with one \
-                load?",
+                as a set of their own: is the mounting of each log stated correctly, and was it one arm with \
+                one load?",
             mounted.mounting,
             joints.join(", ")
         ));

@@ -12,7 +12,7 @@ use std::ops::Range;
 /// A step between samples longer than this, s, or than [`GAP_STEPS`] median steps, is a gap.
 const GAP: f64 = 0.1;
 const GAP_STEPS: f64 = 5.0;
-/// So many of a log's gaps and jumps are named one by one.
+/// At most this many of a log's gaps and jumps are named one by one.
 const SPLITS_SHOWN: usize = 5;
 /// Time stamps that do not rise: up to this share are left out, more make the log unusable.
 const MOST_STALE: f64 = 0.05;

@@ -222,8 +222,8 @@ fn untested_refusal(
         return Some((format!("explains too little (score {:.1})", member.trial.score), true));
     }
     if study.one_path && candidate.effect().is_function_of_path(candidate, &study.data, rule) {
-        let why = "the logs to judge on run the same path: a function of the path cannot be distinguished there \
-            from any other misfit; record another path";
+        let why = "the logs to judge on run the same path: a function of the path cannot be distinguished \
+            there from any other misfit; record another path";
         return Some((why.to_string(), false));
     }
     if model.gave_up(candidate) {
