@@ -83,7 +83,7 @@ pub enum Cause {
     Interrupted,
     /// No heartbeat of a node in three of its periods.
     HeartbeatLost(NodeId),
-    /// No process data of a node in so many cycles.
+    /// No process data of a node for too many cycles.
     DataMissing(NodeId),
     /// A node restarted.
     Rebooted(NodeId),
@@ -107,11 +107,12 @@ pub enum Cause {
     Setpoints(Rejection),
     /// A drive with torque shows that it cannot use it; its statusword.
     Hindered(NodeId, Hindrance, Statusword),
-    /// A joint is not where it was told to be: following error beyond the drive's delay, and its limit, rad.
+    /// A joint is not where it was commanded to be: following error beyond the drive's delay, and its limit,
+    /// rad.
     FollowingError(NodeId, f64, f64),
-    /// A joint does not have the velocity that it was told: error and limit, rad/s.
+    /// A joint does not have the commanded velocity: error and limit, rad/s.
     VelocityError(NodeId, f64, f64),
-    /// A joint stands still so far from the target of its profile, rad.
+    /// A joint stands still at this distance from the target of its profile, rad.
     Stuck(NodeId, f64),
     /// A measured position jumped: by how much, and what its greatest velocity explains, rad.
     PositionJump(NodeId, f64, f64),
