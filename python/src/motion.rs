@@ -64,7 +64,7 @@ impl Excited {
     }
 }
 
-/// What `powerball excite` is told, by the names of its flags.
+/// The options of `powerball excite`, by the names of its flags.
 #[derive(FromPyObject)]
 pub(crate) struct Asked {
     parameters: String,

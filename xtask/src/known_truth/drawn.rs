@@ -111,7 +111,7 @@ pub(super) fn write(page: &mut String, data: &Path, draws: u64, pairs: u64) -> R
     }
     let _ = writeln!(
         page,
-        "\n## Clean pairs\n\nThe first half of a clean log against its second one, {pairs} pairs: {} logs are said to differ.",
+        "\n## Clean pairs\n\nThe first half of a clean log against its second one, {pairs} pairs: {} logs are reported to differ.",
         different.len()
     );
     for sentence in different {

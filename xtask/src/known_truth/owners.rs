@@ -7,7 +7,7 @@ use serde::Deserialize;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Logs of a folder, by file names without `.csv`, and what their owners say of them.
+/// Logs of a folder, by file names without `.csv`, and what their owners state about them.
 #[derive(Deserialize)]
 struct Question {
     folder: String,
@@ -119,7 +119,7 @@ fn differs(explained: &Explained) -> String {
     if cells.is_empty() { "none".into() } else { cells.join("; ") }
 }
 
-/// What is said of all logs.
+/// What is reported about all logs.
 fn elsewhere(explained: &Explained) -> String {
     let all = explained.effects.iter().filter(|e| e.logs.is_empty());
     let of = |e: &powerball::explanation::explain::NamedEffect| {
