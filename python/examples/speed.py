@@ -24,8 +24,8 @@ def cpu(work, times: int = 3) -> float:
     """Least processor time of a piece of work, children included, s."""
 
     def spent() -> float:
-        times = os.times()
-        return times.user + times.system + times.children_user + times.children_system
+        used = os.times()
+        return used.user + used.system + used.children_user + used.children_system
 
     def once() -> float:
         before = spent()

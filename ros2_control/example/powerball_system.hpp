@@ -44,7 +44,7 @@ public:
         return CallbackReturn::FAILURE;
       }
       // How the base stands and what the arm weighs: no set-point leaves that takes more torque than a joint has.
-      if (!succeeded(powerball_guard_model(arm_, parameter("mounting"), parameter("values")))) {
+      if (!check(powerball_guard_model(arm_, parameter("mounting"), parameter("values")))) {
         return CallbackReturn::FAILURE;
       }
       const char * accept = parameter("accept_unverified");
@@ -52,7 +52,7 @@ public:
         powerball_accept_unverified(arm_);
       }
     }
-    return succeeded(powerball_configure(arm_)) ? CallbackReturn::SUCCESS : CallbackReturn::FAILURE;
+    return check(powerball_configure(arm_)) ? CallbackReturn::SUCCESS : CallbackReturn::FAILURE;
   }
 
   CallbackReturn on_cleanup(const rclcpp_lifecycle::State &) override
@@ -64,7 +64,7 @@ public:
 
   CallbackReturn on_activate(const rclcpp_lifecycle::State &) override
   {
-    if (!succeeded(powerball_activate(arm_)) || !succeeded(read_all())) {
+    if (!check(powerball_activate(arm_)) || !check(read_all())) {
       return CallbackReturn::FAILURE;
     }
     // Where the arm is, until a controller says otherwise.
@@ -74,7 +74,7 @@ public:
 
   CallbackReturn on_deactivate(const rclcpp_lifecycle::State &) override
   {
-    return succeeded(powerball_deactivate(arm_)) ? CallbackReturn::SUCCESS : CallbackReturn::ERROR;
+    return check(powerball_deactivate(arm_)) ? CallbackReturn::SUCCESS : CallbackReturn::ERROR;
   }
 
   // The arm stands, its cause was reported; it is configured and activated again by whoever looks after it.
@@ -108,13 +108,13 @@ public:
 
   return_type read(const rclcpp::Time &, const rclcpp::Duration &) override
   {
-    return succeeded(read_all()) ? return_type::OK : return_type::ERROR;
+    return check(read_all()) ? return_type::OK : return_type::ERROR;
   }
 
   return_type write(const rclcpp::Time &, const rclcpp::Duration &) override
   {
     // A refusal is reported; the driver goes on as it went and stops the arm with the third, which read then reports.
-    succeeded(powerball_write(arm_, command_.data()));
+    check(powerball_write(arm_, command_.data()));
     return return_type::OK;
   }
 
@@ -130,7 +130,7 @@ private:
 
   int read_all() { return powerball_read(arm_, position_.data(), velocity_.data(), effort_.data()); }
 
-  bool succeeded(int code)
+  bool check(int code)
   {
     if (code == POWERBALL_ERROR) {
       std::fprintf(stderr, "powerball: %s\n", powerball_message(arm_));

@@ -128,13 +128,14 @@ pub enum Cause {
     Overspeed(JointNumber, f64, f64),
     /// Current mode: velocities of a joint that no joint can have, one after the other; the last one, rad/s.
     ImplausibleVelocity(NodeId, JointNumber, f64),
-    /// Current mode: a joint's position is off its integrated velocity by so much, rad: one of the two is wrong.
+    /// Current mode: a joint's position is off its integrated velocity by this much, rad: one of the two is
+    /// wrong.
     PositionAgainstVelocity(NodeId, JointNumber, f64),
     /// Current mode: a joint's current is not the one that was asked for: measured and asked for, A.
     CurrentError(NodeId, JointNumber, f64, f64),
-    /// Current mode: so much of a joint's torque does not act as the model says, and what may be, N·m.
+    /// Current mode: this much of a joint's torque does not act as in the model, and what may be, N·m.
     TorqueError(NodeId, JointNumber, f64, f64),
-    /// Current mode: a joint is so far from where it should be, and how far it may be, rad.
+    /// Current mode: a joint is this far from where it should be, and how far it may be, rad.
     OffPath(NodeId, JointNumber, f64, f64),
     /// The CAN controller is off the bus.
     BusOff,
@@ -402,7 +403,7 @@ pub enum Refusal {
     NoMode(ControlMode),
     /// The mode was not verified on hardware, and the caller does not accept that.
     NotVerified(ControlMode),
-    /// The bus would be loaded by so much (1 is all of it) in the worst case.
+    /// The bus would be loaded by this much (1 is all of it) in the worst case.
     BusLoad(f64),
     /// The profile contradicts itself; what and where.
     Profile(&'static str),

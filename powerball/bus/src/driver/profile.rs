@@ -102,7 +102,8 @@ pub struct Reactions {
     /// A joint measured faster than this times its greatest velocity, for [`Reactions::missing_cycles`] cycles,
     /// stops the arm.
     pub overspeed_factor: f64,
-    /// So much travel, rad, is asked for in velocity mode before it is compared with the travel that was gone.
+    /// This much travel, rad, is asked for in velocity mode before it is compared with the travel that was
+    /// gone.
     pub scale_travel: f64,
     /// Cycles in a row beyond [`JointProfile::following_error`] that stop the arm; their time is written to 0x6066
     /// where the drive has it.

@@ -127,7 +127,7 @@ fn pulled(context: &Context<'_>, gravity: &[f64; 3], all: &[f64]) -> Option<Colu
 }
 
 /// What all parameters gain where the unshown ones' torques are those found: under the whole tilt they are
-/// those of so much of each direction.
+/// the ones of a given amount of each direction.
 fn moments(context: &Context<'_>, tilt: &[f64], found: &[f64]) -> Vec<f64> {
     let gravity_unobservable = context.data.body.gravity_unobservable();
     let turns = turns(context);

@@ -94,7 +94,7 @@ struct Signal {
 
 /// The old logs leave a coefficient open by this many standard deviations.
 const OPEN: f64 = 2.0;
-/// A coefficient that is known so much better already counts no more.
+/// A coefficient that is already known this much better no longer counts.
 const ENOUGH: f64 = 20.0;
 
 fn duels(open: &Open) -> Vec<Duel<'_>> {

@@ -411,7 +411,7 @@ fn noise_around(traces: &[Trace], order: f64) -> f64 {
 }
 
 /// Orders on either side that say what noise gives, how far the first is and how far they are apart: a path of
-/// four radians tells two orders apart that differ so much.
+/// four radians distinguishes two orders that differ by that much.
 const NEIGHBOURS: usize = 20;
 const FIRST: f64 = 4.0;
 pub(super) const APART: f64 = 1.5;

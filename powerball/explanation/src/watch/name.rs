@@ -39,7 +39,7 @@ const ELSEWHERE: f64 = 20.0;
 const BLOCK: usize = 12;
 /// A heavier body pulls more than any push that is taken for one, kg.
 const HEAVIEST: f64 = 200.0;
-/// A joint shows a change where that explains so much of its χ².
+/// A joint shows a change where that explains this much of its χ².
 const SHOWS: f64 = 15.0;
 
 /// The rows of a stretch of a log, and what is left of them.

@@ -149,7 +149,7 @@ impl Conventions {
         self.differ() || self.is_unclear() || self.doubt().is_some()
     }
 
-    /// Whether so much is left with everything set right that the columns cannot be checked.
+    /// Whether too much is left with everything set right to check the columns.
     #[must_use]
     pub fn is_unclear(&self) -> bool {
         self.left.iter().any(|left| *left > MUCH)

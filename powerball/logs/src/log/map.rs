@@ -223,7 +223,7 @@ pub(super) fn velocity_units() -> impl Iterator<Item = (&'static str, f64)> {
     VELOCITIES.iter().filter(|(_, factor)| *factor != 1.0).map(|(names, factor)| (names[0], *factor))
 }
 
-/// The unit of time in which samples are so far apart.
+/// The unit of time that the distance of samples implies.
 pub(super) fn time_unit(step: f64) -> &'static str {
     match step {
         step if step < SLOWEST => "s",

@@ -7,7 +7,7 @@ use powerball_bus::cia402::{Command, Controlword, Mode, State, Statusword};
 
 /// A brake bites and lets go after this time, s.
 const BRAKE_TIME: f64 = 0.02;
-/// A quick stop brakes so much harder than a joint usually may.
+/// A quick stop brakes this many times as hard as a joint usually may.
 const QUICK: f64 = 2.0;
 /// Below this velocity a joint stands still, rad/s.
 const STILL: f64 = 2e-3;

@@ -16,7 +16,7 @@ const FEED: u16 = 0x6092;
 
 /// Fewer counts in a turn than degrees are no scale of a joint: drives come with 1 / 1 where nobody has set them.
 const FEWEST: f64 = 360.0;
-/// The TOML's value may be rounded by so much of it.
+/// The TOML's value may be rounded by this share of it.
 const ROUNDING: f64 = 1e-4;
 
 /// Counts in a turn of the shaft, and which objects say so.

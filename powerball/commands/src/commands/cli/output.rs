@@ -134,7 +134,7 @@ pub(crate) fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Failu
     write_file(&folder.join(name), bytes)
 }
 
-/// As [`write`], for a path.
+/// As [`write()`], for a path.
 pub(crate) fn write_file(target: &Path, bytes: &[u8]) -> Result<(), Failure> {
     replace::check(target, Some(bytes))?;
     files::write_whole(target, bytes).map_err(Failure::Unusable)

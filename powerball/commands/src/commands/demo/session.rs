@@ -39,7 +39,7 @@ const PAUSE: f64 = 3.0;
 const SHARE: f64 = 0.5;
 /// Paths tried for each log: enough for a condition number near the best, in a fraction of a second.
 const EVALUATIONS: usize = 300;
-/// Paths are drawn so often where the arm is stopped on them.
+/// Paths are drawn this many times where the arm is stopped on them.
 const ATTEMPTS: u64 = 6;
 
 /// What was recorded.

@@ -49,7 +49,7 @@ fn scara() -> (Arm, Plant) {
     (arm, plant)
 }
 
-/// An arm with so much friction and white noise by joint, N·m or N.
+/// An arm with given friction and white noise by joint, N·m or N.
 fn plant(arm: &Arm, bodies: Vec<Body>, levels: &[f64], white: &[f64]) -> Plant {
     let friction = |level: &f64| TanhFriction::new([0.7 * level, 60.0, 0.3 * level, 4.0, *level]);
     let sensors = Sensors {
