@@ -113,7 +113,8 @@ public:
 
   return_type write(const rclcpp::Time &, const rclcpp::Duration &) override
   {
-    // A refusal is reported; the driver goes on as it went and stops the arm with the third, which read then reports.
+    // A refusal is reported; the driver goes on as it went and stops the arm with the third, which read then
+    // reports.
     check(powerball_write(arm_, command_.data()));
     return return_type::OK;
   }

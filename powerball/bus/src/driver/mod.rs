@@ -417,7 +417,7 @@ impl<const N: usize> Driver<N> {
         self.restart
     }
 
-    /// What the drive that the cause is about reported about its error, as far as it was read.
+    /// What the drive that the cause names reported about its error, as far as it was read.
     pub fn details(&self) -> &Details {
         &self.details
     }

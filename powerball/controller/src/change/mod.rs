@@ -19,12 +19,12 @@
 //! 1 + Σ λ_j·(±z_j − m_j), z cut. A lasting model error along x is no change: its size over the last minute
 //! is followed as friction is, and z is less that as well. Under the null the mean of that factor is at most
 //! 1, whichever joints depend on each other and whenever the bet began: it is an e-process. A new bet starts
-//! at every sample, with a capital b ≤ 1 that is known before, and all its beginnings together have C ← (C +
-//! b)·factor (e-SR). Under the null the mean of C grows by at most 1 a sample, and so does that of an average
-//! of C over bets. The alarm rises when the average exceeds A ([`alarm`]): then the mean time to a false
-//! alarm is at least A samples, whatever the noise is like (J. Shin, A. Ramdas, A. Rinaldo, "E-detectors: a
-//! nonparametric framework for sequential change detection", 2022; I. Waudby-Smith, A. Ramdas, "Estimating
-//! means of bounded random variables by betting", 2023).
+//! at every sample, with a capital b ≤ 1 that is known before, and all its beginnings together have
+//! C ← (C + b)·factor (e-SR). Under the null the mean of C grows by at most 1 a sample, and so does that of
+//! an average of C over bets. The alarm rises when the average exceeds A ([`alarm`]): then the mean time to a
+//! false alarm is at least A samples, whatever the noise is like (J. Shin, A. Ramdas, A. Rinaldo,
+//! "E-detectors: a nonparametric framework for sequential change detection", 2022; I. Waudby-Smith, A.
+//! Ramdas, "Estimating means of bounded random variables by betting", 2023).
 
 mod bet;
 mod joint;

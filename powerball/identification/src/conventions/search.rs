@@ -9,7 +9,7 @@ use super::result::GravityIs;
 use dyngen::exact::rational::to_f64;
 use powerball_logs::regression::DataError;
 
-/// Held-out squared errors are compared with this share of the torque's added: below 2 % nothing is asked
+/// Held-out squared errors are compared after adding this share of the torque's: below 2 % nothing is asked
 /// for.
 const FLOOR: f64 = 4e-4;
 /// A change is clear where it lowers squared errors to this share, both ways round.
