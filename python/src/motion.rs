@@ -76,7 +76,7 @@ pub(crate) struct Asked {
     objective: String,
     weight: f64,
     mounting: Vec<String>,
-    /// A height, "none", or nothing said.
+    /// A height, "none", or nothing given.
     floor: Option<Floor>,
     radius: Option<f64>,
     clearance: Option<f64>,

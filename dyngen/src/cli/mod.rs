@@ -114,7 +114,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Man(args) => shell::man(&args),
     };
     match result {
-        // What was written is of no arm, as has been said.
+        // What was written is of no arm, as was reported.
         Ok(code) if code == ExitCode::SUCCESS && DOUBTFUL.load(Ordering::Relaxed) && !accept => {
             ExitCode::from(3)
         }

@@ -100,7 +100,7 @@ fn differs(explained: &Explained) -> String {
             format!("{} {:.1}–{:.1} s", d.effect, d.start_time, d.end_time)
         };
         let list: Vec<String> = log.differs.iter().map(of).collect();
-        let what = if list.is_empty() { "not said".into() } else { list.join(", ") };
+        let what = if list.is_empty() { "not stated".into() } else { list.join(", ") };
         cells.push(format!("{}: {what}", log.log));
     }
     for effect in explained.effects.iter().filter(|e| e.effect == "payload") {

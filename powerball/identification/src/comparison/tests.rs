@@ -115,8 +115,8 @@ fn a_payload_is_reported_with_its_mass() {
     assert!(!loaded.friction.iter().any(|f| f.differs), "{}", loaded.sentence);
 }
 
-/// An arm whose friction differs by a tenth between the halves of its own log is not said to differ by a twentieth from
-/// another one; halves that are alike change nothing to speak of.
+/// An arm whose friction differs by a tenth between the halves of its own log is not reported to differ by a
+/// twentieth from another one; halves that are alike change nothing to speak of.
 #[test]
 fn what_varies_within_a_log_is_no_difference_of_arms() {
     let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();

@@ -64,7 +64,8 @@ fn asked_of_arm(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Conventions 
     };
     let all: Vec<&Log> = logs.iter().chain(validate).collect();
     let kind = properties::kind(&all);
-    // The pose of a joint that does not move is any angle of the arm file, and what no arm is has been said.
+    // The pose of a joint that does not move is any angle of the arm file, and an arm file that describes no
+    // arm was reported.
     let moves = inactive_joints(body.arm(), logs).iter().all(Option::is_none);
     let better =
         if moves && body.filed().doubts().is_empty() { arm_file::better(&asked, &found) } else { None };

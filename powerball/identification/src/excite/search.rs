@@ -199,7 +199,7 @@ pub fn search<J: Clone>(
 }
 
 /// The paths, one for each mounting within its constraints, whose value together is smallest, with what else
-/// `judge` said of them, and of the middle ones of the random starts.
+/// `judge` returned for them, and of the middle ones of the random starts.
 ///
 /// # Errors
 /// Settings that make no sense, [`Error::NoPose`] where there is no room at all, and [`Error::NoPath`] where

@@ -183,7 +183,7 @@ fn pieces(
         let gap = raw.t[k] - raw.t[k - 1];
         let jump = (0..arm.dof()).find(|&j| (raw.q[j][k] - raw.q[j][k - 1]).abs() > farthest(arm, j, gap));
         if restarts.iter().any(|t| raw.t[k - 1] < *t && *t <= raw.t[k]) {
-            // That has been said.
+            // That was reported.
         } else if gap > GAP.max(GAP_STEPS * step) {
             let message =
                 format!("at {:.3} s: a gap of {gap:.3} s: the log is used as two pieces", raw.t[k - 1]);

@@ -251,7 +251,7 @@ impl Columns {
                 }
                 Err(reason) => errors.push(finding("i", reason)),
             },
-            // Where the joints' names are not the arm's, that has been said.
+            // Where the joints' names are not the arm's, that was reported.
             (Err(_), Err(_)) if q.is_err() && !logged_joints(names, asked.map).is_empty() => {}
             (Err(tau), Err(current)) => {
                 let missing = if tau.len() <= current.len() { tau } else { current };
