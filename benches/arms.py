@@ -9,7 +9,7 @@ Each FOLDER is searched for URDF files, of which equal ones count once. Of each 
 is taken. Time (the processor's) and memory are those of one `dyngen describe` process, which derives the sets, and builds and
 proves every function. The error is the largest difference of inverse dynamics over 20 random states, relative to the largest
 torque there, between `dyngen eval` on the arm as the file says it (--exact) and Pinocchio on the file. The table has the chains of at least
-so many joints as --joints says; the sentence above it counts all.
+as many joints as --joints gives; the sentence above it counts all.
 """
 
 import argparse
@@ -168,7 +168,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--dyngen", required=True, help="the program")
     parser.add_argument("--urdf", required=True, nargs="+", type=pathlib.Path, help="folders of URDF files")
-    parser.add_argument("--joints", type=int, default=1, help="the table: only chains of at least so many joints")
+    parser.add_argument("--joints", type=int, default=1, help="the table: only chains of at least this many joints")
     options = parser.parse_args()
     rows, loaded = [], []
     with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-//! The emitted dynamics of the LWA 4P without rotors beside what one writes by hand, in one run.
+//! The emitted dynamics of the LWA 4P without rotors compared with code written by hand, in one run.
 //!
 //! `cargo bench -p powerball-benches --bench dynamics -- --write docs/results/performance.md` writes its
 //! tables into the page.

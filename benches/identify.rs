@@ -1,5 +1,5 @@
-//! A million samples of six joints identified from memory: this project's stream, beside numpy with Pinocchio
-//! in the same run.
+//! A million samples of six joints identified from memory: this project's stream, compared with numpy and
+//! Pinocchio in the same run.
 //!
 //! `cargo bench -p powerball-benches --bench identify` (`PYTHON=…` names an interpreter that has both;
 //! without one only the stream is timed); `-- --write docs/results/performance.md` writes how the stream

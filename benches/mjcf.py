@@ -9,7 +9,7 @@ MuJoCo loads each URDF of the folder (without shapes), saves it as its own forma
 dynamics is compared with mj_inverse over 20 random states, relative to the largest torque there; files of the second folder
 are taken as they are. Then every link's parameters are scaled, exported into the model, and compared again with what MuJoCo
 makes of the new file. Damping, friction, contacts and armature are switched off in MuJoCo. The exit code is 1 where a
-difference is above 1e-6: MuJoCo saves six digits unless it is told otherwise.
+difference is above 1e-6: MuJoCo saves six digits unless it is set otherwise.
 """
 
 import argparse

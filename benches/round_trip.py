@@ -157,7 +157,7 @@ def main():
     parser.add_argument("--sample", type=int, help="how many of them")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--coupled", type=pathlib.Path, help="a folder of URDFs of one chain, in which joints follow others")
-    parser.add_argument("--joints", type=int, default=1, help="only chains of at least so many joints")
+    parser.add_argument("--joints", type=int, default=1, help="only chains of at least this many joints")
     options = parser.parse_args()
     start = time.monotonic()
     chains = ((path, longest_chain(path)) for path in sorted(options.urdf.glob("*.urdf")))

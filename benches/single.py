@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Single precision of a calibrated arm's generated code, beside that of the same arm with right angles.
+"""Single precision of a calibrated arm's generated code, next to that of the same arm with right angles.
 
     cargo build --release -p dyngen
     python3 benches/single.py --dyngen target/release/dyngen --urdf calib_15200003067234149431.urdf --tip tool0
@@ -53,8 +53,8 @@ macro_rules! compared {
                 (error[i], largest[i]) = (error[i].max(off[i]), largest[i].max(sizes[i]));
             }
         }
-        let told = |i: usize| format!("{:.1e} of {:.2}", error[i], largest[i]);
-        println!("{}: torque {}, mass matrix {}, pose {}", stringify!($arm), told(0), told(1), told(2));
+        let text = |i: usize| format!("{:.1e} of {:.2}", error[i], largest[i]);
+        println!("{}: torque {}, mass matrix {}, pose {}", stringify!($arm), text(0), text(1), text(2));
     }};
 }
 

@@ -175,7 +175,7 @@ fn read(text: &str) -> Costs {
         .collect()
 }
 
-/// The table for people: single precision beside double.
+/// The table for people: single precision compared with double.
 fn table(costs: &Costs) -> String {
     let mut text =
         "| function | f32: code, B | stack, B | instructions | f64: code, B | stack, B | instructions | f64 \
@@ -205,7 +205,7 @@ fn table(costs: &Costs) -> String {
     text
 }
 
-/// The same of a control cycle, for `docs/control.md`.
+/// As [`table`], of a control cycle, for `docs/control.md`.
 fn table_of_cycle(costs: &Costs) -> String {
     let mut text =
         "| on a Cortex-M4F, `f32`, six joints | stack, B | instructions |\n|---|---|---|\n".to_string();

@@ -4,7 +4,7 @@ use super::by_hand::Link;
 use dynibo::Robot;
 use std::fmt::Write;
 
-/// Its gravity, which no option changes, m/s².
+/// Gravity in DynIbo, which no option changes, m/s².
 const GRAVITY: f64 = 9.806_65;
 
 /// An arm of six revolute joints.

@@ -43,7 +43,8 @@ use syn::{ItemMod, parse_macro_input, parse_quote};
 /// - `friction = ["viscous", "tanh:216"]`, `tests = true`: friction columns, and the arm's own consistency
 ///   tests.
 /// - `batch = true`: the module `batch` with the functions over blocks of samples.
-/// - `values = "values.json"` besides either: parameter values to bake in; the functions then take none.
+/// - `values = "values.json"` in addition to either: parameter values to bake in; the functions then take
+///   none.
 ///
 /// Everything that is wrong with the arm is reported at once, as errors of the compiler. The crate is built
 /// again when a file changes.

@@ -8,7 +8,7 @@ pub mod arm {
 
 #[dyngen_macros::model(file = "tests/arms/slider.toml", parameters = symbolic)]
 pub mod symbolic {
-    //! The same for any size.
+    //! As the module above, for any size.
 }
 
 #[test]

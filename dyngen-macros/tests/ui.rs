@@ -7,12 +7,12 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The macros as they were built for this very test: their library stands beside it.
+/// The macros as they were built for this very test: their library stands next to it.
 fn library() -> PathBuf {
     let own = std::env::current_exe().unwrap();
-    let beside = std::fs::read_dir(own.parent().unwrap()).unwrap().map(|entry| entry.unwrap().path());
+    let files = std::fs::read_dir(own.parent().unwrap()).unwrap().map(|entry| entry.unwrap().path());
     let start = format!("{}dyngen_macros-", std::env::consts::DLL_PREFIX);
-    let ours = beside.filter(|path| {
+    let ours = files.filter(|path| {
         let name = path.file_name().unwrap().to_string_lossy();
         name.starts_with(&start) && name.ends_with(std::env::consts::DLL_SUFFIX)
     });

@@ -115,7 +115,8 @@ impl Model {
         Model { angles: Angles::new(&arm), arm, symbols, sets, regroupings: Default::default() }
     }
 
-    /// The same arm with its tool at one of its frames (see [`Arm::at_frame`]); the parameter sets are the same.
+    /// This model with its tool at one of its frames (see [`Arm::at_frame`]); the parameter sets are the
+    /// same.
     pub fn at_frame(&self, name: &str) -> Option<Model> {
         Some(Model { arm: self.arm.at_frame(name)?, ..self.clone() })
     }

@@ -149,7 +149,7 @@ fn no_text_makes_it_panic() {
 const COUPLED: &str = "\n[[transmission]]\njoints = [1, 2]\nmatrix = [[1, 0], [0.5, 1]]\n";
 
 #[test]
-fn a_wrong_transmission_is_told_with_its_place() {
+fn a_wrong_transmission_is_reported_with_its_place() {
     let text = format!("{GOOD}{COUPLED}");
     assert!(errors(&text).is_empty());
     let base = GOOD.lines().count() + 1;
@@ -180,7 +180,7 @@ fn a_wrong_transmission_is_told_with_its_place() {
 }
 
 #[test]
-fn names_and_degrees_are_told() {
+fn names_and_degrees_are_reported() {
     let named = |one: &str, two: &str| {
         let name = |text: &str, kind: &str, name: &str| {
             text.replacen(kind, &format!("name = \"{name}\"\n{kind}"), 1)

@@ -257,7 +257,7 @@ fn main_in_c(case: &Case, model: &Model) -> String {
     )
 }
 
-/// The same in Rust, as a function.
+/// A program as of [`main_in_c`], in Rust, as a function.
 fn main_in_rust(case: &Case, model: &Model) -> String {
     let name = case.name;
     let mut body = String::new();
@@ -466,8 +466,8 @@ fn the_file_compiles_without_a_warning() {
     }
 }
 
-/// The reduction of angles stands on sums that are rounded as they are written: a compiler that is told otherwise is
-/// refused.
+/// The reduction of angles stands on sums that are rounded as they are written: a compiler that is set
+/// otherwise is refused.
 #[test]
 fn fast_mathematics_is_refused() {
     if !has("cc") {

@@ -379,8 +379,8 @@ fn describe_says_what_each_symmetry_removed() {
     }
 }
 
-/// What `powerball explain` writes beside values is no parameter of the rigid arm; a list without names is
-/// refused.
+/// What `powerball explain` writes in addition to values is no parameter of the rigid arm; a list without
+/// names is refused.
 #[test]
 fn a_model_is_a_file_of_values() {
     let model = dyngen::Model::derive(dyngen::Arm::read(Path::new(&arm())).unwrap()).unwrap();

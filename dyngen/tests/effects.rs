@@ -79,9 +79,9 @@ fn lugre_is_dahl_where_the_levels_are_equal_and_takes_the_place_of_frictionloss_
     assert_eq!((loss("lift"), loss("turn")), ("0.75".to_string(), "0".to_string()));
 }
 
-/// What MuJoCo cannot say is said in the file, and nothing is written that is wrong.
+/// What MuJoCo cannot model is stated in the file, and nothing is written that is wrong.
 #[test]
-fn other_laws_are_left_out_and_told() {
+fn other_laws_are_left_out_and_reported() {
     let new = exported(ARM, MODEL);
     let words = "joint 'lift': load_friction: MuJoCo has no law 'load'";
     assert!(new.text.contains(&format!("<!-- dyngen: left out: {words} -->")), "{}", new.text);
@@ -112,12 +112,12 @@ fn terms_that_are_none_are_refused() {
         assert_ne!(model, MODEL);
         Known::read(&arm.arm, (&arm.values_json(), "v.json"), Some((&model, "m.json"))).unwrap_err()
     };
-    let told = refused("\"order\": 2.5", "\"order\": -2.5");
-    assert_eq!(told, "m.json: term 3, position_ripple: 'order' must be positive, found -2.5");
-    let told = refused("\"joint\": 3, \"coefficient\": 3", "\"joint\": 9, \"coefficient\": 3");
-    assert_eq!(told, "m.json: term 4, position_ripple: 'joint' must be 1 to 4, found 9");
-    let told = refused("\"distance\": 0.02", "\"distance\": null");
-    assert!(told.contains("'distance' must be a number, found null"), "{told}");
+    let error = refused("\"order\": 2.5", "\"order\": -2.5");
+    assert_eq!(error, "m.json: term 3, position_ripple: 'order' must be positive, found -2.5");
+    let error = refused("\"joint\": 3, \"coefficient\": 3", "\"joint\": 9, \"coefficient\": 3");
+    assert_eq!(error, "m.json: term 4, position_ripple: 'joint' must be 1 to 4, found 9");
+    let error = refused("\"distance\": 0.02", "\"distance\": null");
+    assert!(error.contains("'distance' must be a number, found null"), "{error}");
     assert!(refused("\"law\": \"load\"", "\"law\": 1").contains("'law' must be a name"));
 }
 
@@ -193,8 +193,8 @@ fn a_motor_of_several_joints_is_a_tendon() {
     let known = Known::read(&arm, (&imported.values_json(), "v.json"), Some((MODEL, "model.json"))).unwrap();
     let new = export::mjcf(ARM, "arm.xml", &arm, &known, &Options::default()).unwrap();
     // Motor 1 still turns with its own joint alone.
-    let told: Vec<_> = new.notes.iter().filter(|note| note.contains("turns with several joints")).collect();
-    assert!(told.len() == 1 && told[0].contains("joint 'turn'"), "{:?}", new.notes);
+    let notes: Vec<_> = new.notes.iter().filter(|note| note.contains("turns with several joints")).collect();
+    assert!(notes.len() == 1 && notes[0].contains("joint 'turn'"), "{:?}", new.notes);
     let document = Document::parse(&new.text).unwrap();
     let tendon = document.descendants().find(|n| n.has_tag_name("fixed")).unwrap();
     let number = |key: &str| tendon.attribute(key).unwrap().parse::<f64>().unwrap();

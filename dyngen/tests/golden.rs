@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const ARMS: [&str; 4] = ["pendulum", "planar2r", "scara", "twist"];
-/// Those whose code can be read.
+/// Arms whose code can be read.
 const REVIEWED: [&str; 3] = ["pendulum", "planar2r", "scara"];
 /// Enough to review; every function is compiled.
 const FUNCTIONS: [Function; 7] = {

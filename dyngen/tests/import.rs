@@ -1,5 +1,5 @@
-//! What an imported arm keeps of its URDF, what is refused, and what is said. `benches/tests/urdf.rs` holds its motion
-//! and torques against a Newton–Euler in the URDF's own frames.
+//! What an imported arm keeps of its URDF, what is refused, and what is reported. `benches/tests/urdf.rs`
+//! holds its motion and torques against a Newton–Euler in the URDF's own frames.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -335,7 +335,7 @@ fn imported_values_fit_every_set_of_their_arm() {
 }
 
 /// A joint that is held at a position is a fixed joint with that position in its origin, and what hangs on it
-/// counts; what is left out is said in kilograms.
+/// counts; what is left out is reported in kilograms.
 #[test]
 fn held_joints_keep_their_mass_and_a_base_starts_the_chain() {
     let hand = |lock: &[(&str, f64)]| {

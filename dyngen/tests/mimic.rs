@@ -61,7 +61,7 @@ joint = [
 
 const ARMS: [&str; 3] = [PALLETIZER, MIXED, SCREW];
 
-/// The same chain with every joint free.
+/// The chain of `text` with every joint free.
 fn free(text: &str) -> Model {
     let mut arm = Arm::parse(text, "arm.toml").unwrap();
     arm.joints.iter_mut().for_each(|joint| joint.mimic = None);
@@ -145,7 +145,7 @@ fn rank(columns: &mut Matrix) -> usize {
     columns.len()
 }
 
-/// G and o of an arm, told by its joints alone.
+/// G and o of an arm, from its joints alone.
 fn chain(arm: &Arm) -> (Matrix, Vec<f64>) {
     let own = arm.coordinates();
     let mut g = vec![vec![0.0; own.len()]; arm.links()];
@@ -293,7 +293,7 @@ fn the_rank_is_that_of_the_columns_in_numbers() {
 }
 
 #[test]
-fn what_cannot_follow_is_told() {
+fn what_cannot_follow_is_reported() {
     let error = |mimic: &str| {
         let text = PALLETIZER.replace("mimic = { joint = 2, ratio = -1 }", mimic);
         assert_ne!(text, PALLETIZER);

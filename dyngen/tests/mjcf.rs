@@ -178,9 +178,10 @@ fn a_reference_is_where_the_model_is_drawn() {
     }
 }
 
-/// A joint follows another one by a straight line through both references; what an arm file cannot hold is told.
+/// A joint follows another one by a straight line through both references; what an arm file cannot hold is
+/// reported.
 #[test]
-fn equalities_are_followed_or_told() {
+fn equalities_are_followed_or_reported() {
     let with =
         |equality: &str| ARM.replace("</mujoco>", &format!("<equality>{equality}</equality></mujoco>"));
     let text = with("<joint joint1=\"turn\" joint2=\"pan\" polycoef=\"0.2 -1.5 0 0 0\"/>")
@@ -204,7 +205,7 @@ fn equalities_are_followed_or_told() {
 }
 
 #[test]
-fn what_is_not_read_is_told_with_its_line() {
+fn what_is_not_read_is_reported_with_its_line() {
     let error = |from: &str, to: &str| {
         assert!(ARM.contains(from), "{from}");
         imported(&ARM.replacen(from, to, 1)).unwrap_err().to_string()

@@ -27,14 +27,15 @@ fn error(name: &str, files: &[(&str, &str)]) -> String {
     let folder = folder(name);
     files.iter().for_each(|(file, text)| fs::write(folder.join(file), text).unwrap());
     let source = Source::read(&folder.join(files[0].0));
-    let told = match source {
+    let message = match source {
         Ok(source) => import::source(&source, &Options::default()).unwrap_err().to_string(),
         Err(e) => e.to_string(),
     };
-    told.replace(&format!("{}/", folder.display()), "")
+    message.replace(&format!("{}/", folder.display()), "")
 }
 
-/// The arm in four files: its classes, a body, and the actuators, which the body's file includes from beside the model.
+/// The arm in four files: its classes, a body, and the actuators, which the body's file includes from the
+/// model's folder.
 fn in_parts(folder: &Path) -> PathBuf {
     let piece = |from: &str, to: &str| {
         let start = ARM.find(from).unwrap();
@@ -73,9 +74,9 @@ fn a_model_in_parts_is_the_model() {
     assert_eq!(again.arm, parts.arm);
 }
 
-/// MuJoCo looks beside the model first.
+/// MuJoCo looks in the model's folder first.
 #[test]
-fn a_part_beside_the_model_is_before_one_beside_the_part() {
+fn a_part_next_to_the_model_is_before_one_next_to_the_part() {
     let path = in_parts(&folder("beside"));
     let heavy = "<x><inertial pos=\"0 0 0\" mass=\"80\" diaginertia=\"1 1 1\"/></x>";
     fs::write(path.with_file_name("inertia.xml"), heavy).unwrap();
@@ -84,7 +85,7 @@ fn a_part_beside_the_model_is_before_one_beside_the_part() {
 }
 
 #[test]
-fn what_cannot_be_included_is_told_with_file_and_line() {
+fn what_cannot_be_included_is_reported_with_file_and_line() {
     let model = "<mujoco>\n  <include file=\"parts/a.xml\"/>\n</mujoco>";
     let missing = error("missing", &[("m.xml", model)]);
     assert!(
@@ -139,15 +140,15 @@ fn lines_are_those_of_the_part() {
     let text = fs::read_to_string(&hand).unwrap().replace("range=\"-10 10\"", "damping=\"much\"");
     let line = text.lines().position(|l| l.contains("much")).unwrap() + 1;
     fs::write(&hand, text).unwrap();
-    let told = import::source(&Source::read(&path).unwrap(), &Options::default()).unwrap_err().to_string();
-    assert!(told.contains(&format!("line {line} of parts/hand.xml: joint 'turn'")), "{told}");
+    let message = import::source(&Source::read(&path).unwrap(), &Options::default()).unwrap_err().to_string();
+    assert!(message.contains(&format!("line {line} of parts/hand.xml: joint 'turn'")), "{message}");
 
     // Behind a part the model's own lines go on.
     let model = fs::read_to_string(&path).unwrap().replace("<actuator>", "<attach/><actuator>");
     let line = model.lines().position(|l| l.contains("<attach/>")).unwrap() + 1;
     fs::write(&path, model).unwrap();
-    let told = import::source(&Source::read(&path).unwrap(), &Options::default()).unwrap_err().to_string();
-    assert!(told.contains(&format!("line {line}: <attach>")), "{told}");
+    let message = import::source(&Source::read(&path).unwrap(), &Options::default()).unwrap_err().to_string();
+    assert!(message.contains(&format!("line {line}: <attach>")), "{message}");
 }
 
 fn utf16(text: &str, big_endian: bool, mark: bool) -> Vec<u8> {
@@ -186,9 +187,9 @@ fn letters_are_read_as_they_were_written() {
     let mut torn = utf16(&text, false, true);
     torn.pop();
     fs::write(&path, torn).unwrap();
-    let told = Source::read(&path).unwrap_err().to_string();
+    let message = Source::read(&path).unwrap_err().to_string();
     assert!(
-        told.ends_with("torn.urdf: it is UTF-16 that breaks off within a letter: save it as UTF-8"),
-        "{told}"
+        message.ends_with("torn.urdf: it is UTF-16 that breaks off within a letter: save it as UTF-8"),
+        "{message}"
     );
 }

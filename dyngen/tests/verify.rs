@@ -379,7 +379,7 @@ fn a_file_in_c_is_proven_and_its_mutants_are_found() {
     }
 }
 
-/// What the command says of a text as a generated file: its exit code, standard output and error.
+/// What the command reports about a text as a generated file: its exit code, standard output and error.
 fn command(name: &str, text: &str, arm: &str, more: &[&str]) -> (Option<i32>, String, String) {
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     std::fs::write(&file, text).unwrap();

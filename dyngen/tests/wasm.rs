@@ -99,7 +99,7 @@ fn torques_in_node_are_the_evaluator_s() {
     }
 }
 
-/// The module of the crate in a folder, whose function takes so many numbers.
+/// The module of the crate in a folder, whose function takes `numbers` numbers.
 fn built(folder: &Path, workspace: &Path, numbers: usize) -> std::path::PathBuf {
     let manifest = "[package]\nname = \"wasm\"\nversion = \"0.0.0\"\nedition = \"2024\"\n[workspace]\n[lib]\ncrate-type = [\"cdylib\"]\n\
                     [dependencies]\nnalgebra = { version = \"0.35\", default-features = false, features = [\"libm\"] }\n";

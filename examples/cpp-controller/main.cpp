@@ -43,11 +43,11 @@ int fail(const char *what) {
 } // namespace
 
 int main() {
-  // Wrong use is told, not run into.
+  // Wrong use is reported.
   my_arm_model never_begun = {};
   Vector zero{}, torque{};
   if (my_arm_torque(&never_begun, zero.data(), zero.data(), zero.data(), 0, nullptr, torque.data()) != MY_ARM_NOT_BEGUN) {
-    return fail("a model that was not begun gives torques");
+    return fail("a model without begin gives torques");
   }
   if (my_arm_begin(nullptr) != MY_ARM_NULL) {
     return fail("null is taken for a model");

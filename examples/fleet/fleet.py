@@ -95,8 +95,8 @@ def arm_of(text: str) -> pb.Arm:
 
 def reduce_log(job: Job, log: str, key: str) -> dict[str, Any]:
     """One log into the store: its summary, or why there is none."""
-    begun = time.perf_counter()
-    told: dict[str, Any] = {"log": log, "key": key, "worker": worker_name()}
+    start = time.perf_counter()
+    outcome: dict[str, Any] = {"log": log, "key": key, "worker": worker_name()}
     try:
         fs, name = fsspec.url_to_fs(log)
         with tempfile.TemporaryDirectory() as folder:
@@ -104,14 +104,14 @@ def reduce_log(job: Job, log: str, key: str) -> dict[str, Any]:
             here = name if "file" in fs.protocol else os.path.join(folder, os.path.basename(name))
             if here != name:
                 fs.get_file(name, here)
-            told["bytes"] = os.path.getsize(here)
+            outcome["bytes"] = os.path.getsize(here)
             data = pb.summarize(arm_of(job.arm), here, map=job.map or None).to_bytes()
         write(f"{job.store}/logs/{key}.summary", data)
-        told["summary"] = len(data)
+        outcome["summary"] = len(data)
     except (pb.Error, OSError) as why:
-        told["failed"] = str(why)
+        outcome["failed"] = str(why)
         write(f"{job.store}/failed/{key}.json", json.dumps({"log": log, "why": str(why)}).encode())
-    return {**told, "seconds": time.perf_counter() - begun}
+    return {**outcome, "seconds": time.perf_counter() - start}
 
 
 def join(job: Job, *members: str) -> str:
@@ -172,7 +172,7 @@ def run(client: dd.Client, job: Job, logs: str, retry: bool = False) -> Report:
     todo = {key: log for key, log in found.items() if key not in skipped}
     report = Report(None, {}, len(found) - len(todo))
 
-    begun = time.perf_counter()
+    start = time.perf_counter()
     # A worker that dies takes its logs to another one; a log that kills every worker is given up.
     futures = {
         client.submit(reduce_log, job, log, key, pure=False, retries=1): key for key, log in todo.items()
@@ -184,15 +184,15 @@ def run(client: dd.Client, job: Job, logs: str, retry: bool = False) -> Report:
             why = f"the worker ended: {future.exception()}"
             write(f"{job.store}/failed/{key}.json", json.dumps({"log": todo[key], "why": why}).encode())
         else:
-            told = future.result()
-            of_worker = report.workers.setdefault(told["worker"], [0.0, 0.0])
-            of_worker[0] += told["seconds"]
+            outcome = future.result()
+            of_worker = report.workers.setdefault(outcome["worker"], [0.0, 0.0])
+            of_worker[0] += outcome["seconds"]
             of_worker[1] += 1
-            if "summary" in told:
-                sizes[0] += told["bytes"]
-                sizes[1] += told["summary"]
+            if "summary" in outcome:
+                sizes[0] += outcome["bytes"]
+                sizes[1] += outcome["summary"]
         future.release()
-    report.seconds, report.bytes = time.perf_counter() - begun, (sizes[0], sizes[1])
+    report.seconds, report.bytes = time.perf_counter() - start, (sizes[0], sizes[1])
 
     done = keys_in(job.store, "logs")
     for key, log in found.items():

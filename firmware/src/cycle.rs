@@ -67,7 +67,7 @@ pub struct Output {
     pub external: Joints,
     /// The model's torque: rigid arm, friction and effects, N·m.
     pub model: Joints,
-    /// Its friction, N·m.
+    /// The model's friction, N·m.
     pub friction: Joints,
 }
 

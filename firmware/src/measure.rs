@@ -3,7 +3,7 @@
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 
-/// Instructions in a tick of the board's 25 MHz timer: QEMU is told that one takes 1 ns.
+/// Instructions in a tick of the board's 25 MHz timer: QEMU is set so that one takes 1 ns.
 const INSTRUCTIONS_PER_TICK: u32 = 40;
 const CALLS: u32 = 400;
 

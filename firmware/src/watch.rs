@@ -9,7 +9,7 @@ use powerball::controller::change::{Alarm, Bet, Colour, Joint, Standing, Term, W
 /// Cycles from row to row.
 pub const TURNS: usize = 4;
 
-/// From one false alarm to the next there are so many rows in the mean: a day at 200/4 Hz.
+/// Mean number of rows from one false alarm to the next: a day at 200/4 Hz.
 const LEVEL: f32 = 24.0 * 3600.0 * 50.0;
 
 /// A residual's colour, of the size that the virtual arm's have.

@@ -75,7 +75,7 @@ fn exit_codes_tell_refusals_from_wrong_use() {
 }
 
 #[test]
-fn a_joint_moves_where_it_is_told_and_the_brakes_close_after() {
+fn a_joint_moves_where_it_is_commanded_and_the_brakes_close_after() {
     let moved =
         json(&powerball(&["bus", "move", "--joint", "3", "--by", "-0.25", "--speed", "0.3", "--json"]));
     let (from, at) = (moved["from"].as_f64().unwrap(), moved["at"].as_f64().unwrap());

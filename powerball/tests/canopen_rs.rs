@@ -87,7 +87,7 @@ fn their_aborts_are_ours() {
     assert_eq!(aborted(constant), AbortCode::READ_ONLY);
 }
 
-/// Their client with a server made of our codecs.
+/// The other crate's client with a server made of our codecs.
 #[test]
 fn their_client_reads_and_writes_what_we_encode() {
     let text = b"a name that needs segments";

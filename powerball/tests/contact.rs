@@ -48,7 +48,7 @@ struct Outcome {
     calm: f64,
     /// Delays, s; infinite where a push was missed.
     delays: Vec<f64>,
-    /// The same with a constant threshold: the largest external torque without contact.
+    /// Delays with a constant threshold: the largest external torque without contact.
     constant: Vec<f64>,
     early: usize,
     right: usize,

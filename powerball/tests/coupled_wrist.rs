@@ -160,7 +160,7 @@ fn the_controllers_torques_are_those_of_the_joints() {
     }
 }
 
-/// Ripple of a motor that turns with two joints is on both joints' torques, and is told as that motor's.
+/// Ripple of a motor that turns with two joints is on both joints' torques, and is reported as that motor's.
 #[test]
 fn ripple_of_a_coupled_motor_is_named_on_it() {
     let arm = arm();
@@ -186,7 +186,7 @@ fn ripple_of_a_coupled_motor_is_named_on_it() {
     let number = |key: &str| said["parameters"][key][0].as_f64().unwrap();
     approx::assert_relative_eq!(number("orders"), order, max_relative = 1e-3);
     approx::assert_relative_eq!(number("amplitudes"), size, max_relative = 0.03);
-    // Its terms are within their standard errors, which are told.
+    // Its terms are within their standard errors, which are reported.
     for t in &explained.model.additions.terms {
         let truth = match t.term.law {
             Law::Sine { .. } => size,

@@ -79,9 +79,9 @@ fn a_written_path_keeps_floor_links_and_torques() {
         "--json",
     ]);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    let told: Value = serde_json::from_slice(&run.stdout).unwrap();
+    let printed: Value = serde_json::from_slice(&run.stdout).unwrap();
     let rows = rows(&file);
-    assert_eq!(rows.len(), told["samples"].as_u64().unwrap() as usize);
+    assert_eq!(rows.len(), printed["samples"].as_u64().unwrap() as usize);
 
     let arm = lwa4p::arm().unwrap();
     let dynamics = Dynamics::new(Chain::new(&arm), lwa4p::links()).unwrap();
@@ -113,19 +113,19 @@ fn a_written_path_keeps_floor_links_and_torques() {
         }
     }
     assert!(nearest >= 0.03 - 1e-6, "{nearest}");
-    let told_nearest = told["nearest"]["distance"].as_f64().unwrap();
-    assert!(told_nearest <= nearest + 0.004 || nearest > 0.03, "{told_nearest} {nearest}");
+    let reported_nearest = printed["nearest"]["distance"].as_f64().unwrap();
+    assert!(reported_nearest <= nearest + 0.004 || nearest > 0.03, "{reported_nearest} {nearest}");
     for (j, torque) in torque.iter().enumerate() {
         let limit = arm.joints[j].torque.unwrap();
         assert!(*torque <= 0.95 * limit, "joint {}: {torque} of {limit}", j + 1);
-        let told = told["joints"][j]["torque"].as_f64().unwrap();
-        assert!((told - torque).abs() < 1e-6 * limit, "joint {}: {told} {torque}", j + 1);
+        let reported = printed["joints"][j]["torque"].as_f64().unwrap();
+        assert!((reported - torque).abs() < 1e-6 * limit, "joint {}: {reported} {torque}", j + 1);
     }
     let html = std::fs::read_to_string(&page).unwrap();
     assert_eq!(html.matches("<svg").count(), 3);
     // The same path again from the same seed is checked by the search's own tests; here, that the file is
-    // what was told.
-    let velocity = told["joints"][0]["velocity"].as_f64().unwrap();
+    // what was reported.
+    let velocity = printed["joints"][0]["velocity"].as_f64().unwrap();
     let largest = rows.iter().fold(0.0f64, |m, row| m.max(row[7].abs()));
     assert!((velocity - largest).abs() < 1e-8);
 }
@@ -151,8 +151,8 @@ fn a_mounting_each_has_a_file_and_its_own_floor() {
         "--json",
     ]);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    let told: Value = serde_json::from_slice(&run.stdout).unwrap();
-    let paths = told["trajectories"].as_array().unwrap();
+    let printed: Value = serde_json::from_slice(&run.stdout).unwrap();
+    let paths = printed["trajectories"].as_array().unwrap();
     // Rolled by -90°, y of the base points down: gravity is along +y.
     for (path, up) in paths.iter().zip([Vector3::z(), -Vector3::y()]) {
         let rows = rows(Path::new(path["out"].as_str().unwrap()));
@@ -162,8 +162,8 @@ fn a_mounting_each_has_a_file_and_its_own_floor() {
             }
         }
     }
-    // Alone and upright 23 can be told apart.
-    assert!(told["parameters"].as_u64().unwrap() > 23, "{}", told["parameters"]);
+    // Alone and upright 23 can be distinguished.
+    assert!(printed["parameters"].as_u64().unwrap() > 23, "{}", printed["parameters"]);
     assert!(scratch("mounted_1.csv").exists() && scratch("mounted_2.csv").exists() && !file.exists());
 }
 

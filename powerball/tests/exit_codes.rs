@@ -74,9 +74,11 @@ fn an_arm_file_in_another_unit_makes_a_result_useless() {
             let done = powerball(&folder, &command);
             let first = String::from_utf8_lossy(&done.stdout).lines().next().unwrap_or_default().to_string();
             assert_eq!(code(&done) == 3, reason.is_some(), "{command}: {first} {}", said(&done));
-            // A comparison says of which side, and `identify` of that side says how.
+            // A comparison reports which side, and `identify` of that side reports how.
             let sentence = match command.starts_with("compare") {
-                true => reason.map(|_| "a.csv: the columns or the arm file are not what they are said to be"),
+                true => {
+                    reason.map(|_| "a.csv: the columns or the arm file are not what they are declared to be")
+                }
                 false => reason,
             };
             assert!(sentence.is_none_or(|sentence| first.contains(sentence)), "{command}: {first}");

@@ -144,7 +144,7 @@ fn a_run_that_is_stopped_keeps_its_log() {
     assert_eq!(refused.status.code(), Some(2), "{}", complaint(&refused));
 }
 
-/// As of `explain --experiment`: the plant next to the arm file moves, and it is said which one does.
+/// As with `explain --experiment`: the plant next to the arm file moves, and it is reported which one does.
 #[test]
 fn the_plant_next_to_the_arm_file_moves() {
     let text = std::fs::read_to_string(ARM).unwrap();

@@ -93,7 +93,7 @@ fn a_fit_comes_with_a_real_arm_that_costs_next_to_nothing() {
     assert!(String::from_utf8_lossy(&strict.stderr).contains("may exceed 0.1 % of its torque"));
 }
 
-/// Results are written and the reason is said; who knows better accepts them.
+/// Results are written and the reason is reported; who knows better accepts them.
 #[test]
 fn a_result_that_should_not_be_built_on_ends_with_3() {
     let (folder, fit, _) = session("doubtful");
@@ -106,12 +106,12 @@ fn a_result_that_should_not_be_built_on_ends_with_3() {
     let doubtful = identify(&reversed);
     assert_eq!(doubtful.status.code(), Some(3));
     assert!(
-        said(&doubtful).starts_with("The columns are not what they are said to be."),
+        said(&doubtful).starts_with("The columns are not what they are declared to be."),
         "{}",
         said(&doubtful)
     );
     let reason = String::from_utf8_lossy(&doubtful.stderr);
-    assert!(reason.contains("not what they are said to be") && reason.contains("--accept"), "{reason}");
+    assert!(reason.contains("not what they are declared to be") && reason.contains("--accept"), "{reason}");
     assert!(Path::new(out).join("identified.json").is_file());
 
     let accepted = identify(&[&reversed[..], &["--accept", "--quiet"]].concat());
@@ -229,7 +229,8 @@ fn estimators_are_chosen_by_name_and_their_values_go_back() {
     assert!(json(&done)["distance"].as_array().unwrap().iter().all(|d| d.as_f64().unwrap() < 1.0));
 }
 
-/// Table 3 is no arm's: the nearest one is told with its distance, and is one by the generator's judgement.
+/// Table 3 is no arm's: the nearest one is reported with its distance, and is one by the generator's
+/// judgement.
 #[test]
 fn published_values_become_those_of_a_real_arm() {
     let folder = scratch("published");

@@ -84,9 +84,9 @@ fn identify(folder: &Path, out: &str) -> Output {
 fn what_was_identified_is_in_a_copy_of_the_urdf() {
     let folder = session("export");
     let done = identify(&folder, "result");
-    // Standard output is the result alone, whatever is to be said of the export.
-    let told: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
-    assert!(told["friction"][1]["coulomb_std"].as_f64().is_some_and(|std| std > 0.0));
+    // Standard output is the result alone, whatever is to be reported about the export.
+    let printed: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert!(printed["friction"][1]["coulomb_std"].as_f64().is_some_and(|std| std > 0.0));
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let text = fs::read_to_string(folder.join("result/two.urdf")).unwrap();
     assert!(text.contains("<!-- kept as it is -->"));

@@ -31,7 +31,7 @@ fn read(file: &Path) -> Log {
     read_log(file, &Arm::read(Path::new(&hardware())).unwrap(), &mut Vec::new()).unwrap()
 }
 
-/// Runs a command and kills it (SIGKILL) as soon as a file has so many bytes.
+/// Runs a command and kills it (SIGKILL) as soon as a file has `bytes` bytes.
 fn kill_when(arguments: &[&str], file: &Path, bytes: u64) {
     let mut child = powerball(arguments).spawn().unwrap();
     let started = Instant::now();
@@ -43,7 +43,7 @@ fn kill_when(arguments: &[&str], file: &Path, bytes: u64) {
     child.wait().unwrap();
 }
 
-/// A swing of all joints of so many seconds, from rest to rest.
+/// A swing of all joints of `seconds` seconds, from rest to rest.
 fn trajectory(file: &Path, seconds: usize) {
     let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
     for k in 0..=200 * seconds {
@@ -107,10 +107,10 @@ fn a_killed_warm_up_goes_on_with_what_it_saw() {
     assert!(!folder.join("warm_up.json").exists());
 
     // Not warm yet: the next run keeps that too and goes on.
-    let (code, told) = run(&["--most", "150"]);
-    assert_eq!((code, &told["warm"]), (Some(1), &Value::Bool(false)));
-    let (code, told) = run(&[]);
-    assert_eq!((code, &told["warm"]), (Some(0), &Value::Bool(true)));
+    let (code, printed) = run(&["--most", "150"]);
+    assert_eq!((code, &printed["warm"]), (Some(1), &Value::Bool(false)));
+    let (code, printed) = run(&[]);
+    assert_eq!((code, &printed["warm"]), (Some(0), &Value::Bool(true)));
     let after = std::fs::read_to_string(&csv).unwrap();
     let whole = before.rfind('\n').unwrap();
     assert_eq!(after[..whole], before[..whole]);
@@ -118,14 +118,14 @@ fn a_killed_warm_up_goes_on_with_what_it_saw() {
         after.lines().skip(1).map(|l| l.split(',').next().unwrap().parse().unwrap()).collect();
     assert!(times.windows(2).all(|w| w[1] > w[0]));
     // Cycles from the very beginning count, and the time constant is the plant's 120 s all the same.
-    let joint = &told["joints"][3];
+    let joint = &printed["joints"][3];
     assert!(joint["cycles"][0][0].as_f64().unwrap() < 5.0);
     let found = joint["exponential"]["time_constant"].as_f64().unwrap();
     assert!((100.0..140.0).contains(&found), "{found}");
 
     // One that is warm is not gone on with.
-    let (_, told) = run(&["--most", "20"]);
-    assert!(told["seconds"].as_f64().unwrap() < 30.0);
+    let (_, printed) = run(&["--most", "20"]);
+    assert!(printed["seconds"].as_f64().unwrap() < 30.0);
 }
 
 /// Ctrl-C, twice: the arm is stopped, the log is closed and whole, and the reason is printed.

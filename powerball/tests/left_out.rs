@@ -1,4 +1,5 @@
-//! What the command says of a format that it was built without. With the feature `formats` it reads them: tests/logs.rs.
+//! What the command reports about a format that it was built without. With the feature `formats` it reads
+//! them: tests/logs.rs.
 
 #![cfg(not(feature = "formats"))]
 #![allow(clippy::unwrap_used, clippy::panic)]

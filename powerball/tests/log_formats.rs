@@ -27,7 +27,7 @@ fn read(path: &Path, map: &str) -> (Log, Vec<Finding>) {
     Log::read_as(path, &arm(), &ColumnMap::parse(map, "map").unwrap()).unwrap()
 }
 
-fn told(contents: &Contents) -> String {
+fn notes_of(contents: &Contents) -> String {
     contents.notes.iter().map(|note| format!("{note}\n")).collect()
 }
 
@@ -70,10 +70,10 @@ fn a_damaged_chunk_loses_its_own_messages_only() {
         let file = folder.join(name);
         std::fs::write(&file, bytes).unwrap();
         let contents = read_contents(&file).unwrap();
-        let (table, told) = (&contents.tables[0], told(&contents));
+        let (table, notes) = (&contents.tables[0], notes_of(&contents));
         assert_eq!(table.line.len() as u64, end.message_count - lost as u64, "{name}");
-        assert!(told.contains(&format!("1 of {chunks} chunks are damaged (the first: chunk 2")), "{told}");
-        assert!(told.contains(&format!("{lost} messages are lost")), "{told}");
+        assert!(notes.contains(&format!("1 of {chunks} chunks are damaged (the first: chunk 2")), "{notes}");
+        assert!(notes.contains(&format!("{lost} messages are lost")), "{notes}");
         for column in &table.columns {
             let whole = all.column(&column.name).unwrap();
             let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
@@ -86,7 +86,7 @@ fn a_damaged_chunk_loses_its_own_messages_only() {
     wrong[at - 8 - 4 - 4 - 4] ^= 1;
     let file = folder.join("checksum.mcap");
     std::fs::write(&file, wrong).unwrap();
-    assert!(told(&read_contents(&file).unwrap()).contains("CRC"));
+    assert!(notes_of(&read_contents(&file).unwrap()).contains("CRC"));
 }
 
 /// Chunks without a topic that is read are counted by the index and stay on the disk.
@@ -123,7 +123,7 @@ fn chunks_of_other_topics_are_not_read() {
     let samples = contents.tables.iter().map(|t| (t.name.as_str(), t.line.len())).collect::<Vec<_>>();
     assert_eq!(samples, [("/a", 30), ("/b", 29), ("/camera", 30)]);
     assert_eq!(contents.tables[2].received[29], 1e-9 * 290_000_002.0);
-    assert!(told(&contents).contains("1 of 90 chunks are damaged"), "{}", told(&contents));
+    assert!(notes_of(&contents).contains("1 of 90 chunks are damaged"), "{}", notes_of(&contents));
     // Who asks for /a alone does not meet the damage of /b.
     let (log, findings) = read(&file, "topic = \"/a\"\nclock = \"receipt\"");
     assert_eq!(log.t.len(), 30);
@@ -221,7 +221,7 @@ fn the_joints_of_an_arm_keep_their_names_in_mcap() {
 
 // rosbag2's SQLite.
 
-/// What a crash left beside a bag is brought in, or taken back, on a copy: the bag's folder stays as it was.
+/// What a crash left next to a bag is brought in, or taken back, on a copy: the bag's folder stays as it was.
 #[test]
 fn a_bag_that_a_crash_left_is_read_and_its_folder_stays_as_it_is() {
     let (csv, _) = read(&data("log.csv"), "");
@@ -238,7 +238,7 @@ fn a_bag_that_a_crash_left_is_read_and_its_folder_stays_as_it_is() {
             assert_eq!(own[..], wanted[..samples], "{name}");
         }
     }
-    // A bag that was closed is read where nobody may write, and without a file beside it.
+    // A bag that was closed is read where nobody may write, and without a file next to it.
     let folder = folder("closed");
     let file = folder.join("bag #1?.db3");
     std::fs::copy(data("bag.db3"), &file).unwrap();
@@ -269,8 +269,8 @@ fn an_sqlite_file_that_is_torn_or_no_bag_says_so() {
     // What stands before the damage is read.
     std::fs::write(&file, &whole[..whole.len() / 2]).unwrap();
     let contents = read_contents(&file).unwrap();
-    let (samples, told) = (contents.tables[0].line.len(), told(&contents));
-    assert!(samples > 30 && samples < 132 && told.contains("damaged after message"), "{samples}: {told}");
+    let (samples, notes) = (contents.tables[0].line.len(), notes_of(&contents));
+    assert!(samples > 30 && samples < 132 && notes.contains("damaged after message"), "{samples}: {notes}");
     // Another program's database.
     let mut other = whole.clone();
     for at in 0..other.len() - 8 {
@@ -425,8 +425,8 @@ fn datasets_of_lerobot_are_read_as_they_are() {
             let own = |k: usize| log.t[k] - log.t[piece.start] - 0.01 * (k - piece.start) as f64;
             assert!(piece.clone().all(|k| own(k).abs() < 1e-6), "{name}");
         }
-        let told = findings.iter().map(|f| format!("{f}\n")).collect::<String>();
-        assert!(told.contains("3 episodes") && told.contains("even frames at 100 Hz"), "{told}");
+        let notes = findings.iter().map(|f| format!("{f}\n")).collect::<String>();
+        assert!(notes.contains("3 episodes") && notes.contains("even frames at 100 Hz"), "{notes}");
     }
     let asked = |path: &Path, map: &str| {
         let map = ColumnMap::parse(map, "map").unwrap();
@@ -451,8 +451,8 @@ fn datasets_of_lerobot_are_read_as_they_are() {
     std::fs::write(&file, "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n").unwrap();
     assert!(asked(&folder, &degrees).contains("git lfs pull"), "{}", asked(&folder, &degrees));
     std::fs::copy(data("lerobot_v30/data/chunk-000/file-000.parquet"), &file).unwrap();
-    let told = self::told(&read_contents(&folder).unwrap());
-    assert!(told.contains("counts 3 episodes, and 2 are there"), "{told}");
+    let notes = notes_of(&read_contents(&folder).unwrap());
+    assert!(notes.contains("counts 3 episodes, and 2 are there"), "{notes}");
     // A file of another dataset among them.
     std::fs::copy(data("types.parquet"), folder.join("data/chunk-000/file-001.parquet")).unwrap();
     assert!(asked(&folder, &degrees).contains("other columns"), "{}", asked(&folder, &degrees));
@@ -516,14 +516,14 @@ fn folders_of_bags_are_read_as_they_are() {
     for name in ["split_2.mcap.zstd", "split_10.mcap.zstd"] {
         std::fs::copy(data("split").join(name), folder.join(name)).unwrap();
     }
-    let told = same(&folder);
-    assert!(told.contains("has no metadata.yaml"), "{told}");
+    let notes = same(&folder);
+    assert!(notes.contains("has no metadata.yaml"), "{notes}");
     // One of its files is missing.
     std::fs::copy(data("split/metadata.yaml"), folder.join("metadata.yaml")).unwrap();
     std::fs::remove_file(folder.join("split_10.mcap.zstd")).unwrap();
     let contents = read_contents(&folder).unwrap();
     assert_eq!(contents.tables[0].line.len(), 60);
-    assert!(self::told(&contents).contains("split_10.mcap.zstd is not there"), "{}", self::told(&contents));
+    assert!(notes_of(&contents).contains("split_10.mcap.zstd is not there"), "{}", notes_of(&contents));
     std::fs::remove_file(folder.join("split_2.mcap.zstd")).unwrap();
     let error = read_contents(&folder).unwrap_err().to_string();
     assert!(error.contains("the files of metadata.yaml are not there"), "{error}");
@@ -561,9 +561,9 @@ fn bags_of_ros_1_are_read() {
     let contents = read(&damaged).unwrap();
     let samples = contents.tables[0].line.len();
     assert!(
-        samples > 40 && samples < 120 && told(&contents).contains("chunks are damaged"),
+        samples > 40 && samples < 120 && notes_of(&contents).contains("chunks are damaged"),
         "{}",
-        told(&contents)
+        notes_of(&contents)
     );
 }
 
@@ -587,7 +587,7 @@ fn hdf5_and_matlabs_version_7_3_are_read() {
     );
     assert_eq!(demo.column("obs.robot0_joint_pos2").unwrap()[9], csv.q[1][9] + 1.0);
     assert_eq!(demo.column("dones").unwrap().iter().sum::<f64>(), 19.0);
-    assert!(told(&contents).contains("obs.picture"), "{}", told(&contents));
+    assert!(notes_of(&contents).contains("obs.picture"), "{}", notes_of(&contents));
 }
 
 /// Cut off or damaged anywhere, a file is refused or read, and nothing stops the program.

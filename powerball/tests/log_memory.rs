@@ -103,7 +103,8 @@ fn looked_at(file: &Path, more: &[&str], kilobytes: usize) -> (Option<i32>, Stri
     (done.status.code(), said)
 }
 
-/// Files that say of themselves that they are large: refused by what they say, and not by what is left when it is too late.
+/// Files that state that they are large: refused by the size they state, and not by what is left when it is
+/// too late.
 #[test]
 fn what_needs_more_memory_than_is_allowed_is_refused_before_it_is_read() {
     const ADDRESSES: usize = 600_000;

@@ -87,10 +87,10 @@ fn mutated_files_are_read_or_refused_soon_and_with_little_memory() {
         for seed in 0..COUNT {
             let mut random = ChaCha8Rng::seed_from_u64(1000 * k as u64 + seed);
             std::fs::write(&file, mutated(&whole, &mut random)).unwrap();
-            let begun = Instant::now();
+            let start = Instant::now();
             let read = std::panic::catch_unwind(|| read_contents(&file));
             let read = read.unwrap_or_else(|_| panic!("{name}: a panic at seed {seed}"));
-            assert!(begun.elapsed() < LONGEST, "{name}: seed {seed} takes {:?}", begun.elapsed());
+            assert!(start.elapsed() < LONGEST, "{name}: seed {seed} takes {:?}", start.elapsed());
             if let Err(error) = read {
                 assert!(error.0.iter().all(|reason| !reason.message.is_empty()), "{name}: seed {seed}");
                 refused += 1;

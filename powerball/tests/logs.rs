@@ -59,9 +59,9 @@ fn every_format_comes_to_the_same_log_whatever_the_order_of_its_joints() {
         let (log, findings) = read(name, &format!("{JOINTS}{map}")).unwrap();
         assert!(differs(&log, &csv) <= within, "{name}: {}", differs(&log, &csv));
         assert_eq!(log.pieces.len(), 1, "{name}");
-        let told: Vec<String> = findings.iter().map(ToString::to_string).collect();
+        let notes: Vec<String> = findings.iter().map(ToString::to_string).collect();
         let known = ["kept out", "comment"];
-        assert!(told.iter().all(|t| known.iter().any(|known| t.contains(known))), "{name}: {told:?}");
+        assert!(notes.iter().all(|t| known.iter().any(|known| t.contains(known))), "{name}: {notes:?}");
         assert_eq!(log.temperature.is_some(), name == "dynamic.mcap");
     }
     // The same names the other way round are another arm.
@@ -92,7 +92,7 @@ fn a_dataset_of_lists_is_a_log_of_episodes() {
 
 /// A file of MATLAB's that is torn or of a version with another format says so; no byte of it stops the program.
 #[test]
-fn a_damaged_file_of_matlabs_is_told() {
+fn a_damaged_file_of_matlabs_is_reported() {
     for name in ["stored.mat", "packed.mat"] {
         let whole = std::fs::read(data(name)).unwrap();
         let file = std::env::temp_dir().join(format!("powerball_{}_{name}", std::process::id()));
@@ -123,7 +123,7 @@ fn the_time_of_receipt_counts_where_it_is_asked_for() {
 }
 
 #[test]
-fn topics_are_joined_in_time_and_it_is_said_how() {
+fn topics_are_joined_in_time_and_it_is_reported_how() {
     let (csv, _) = read("log.csv", "").unwrap();
     let (log, findings) = read("two_topics.mcap", JOINTS).unwrap();
     // The drives spoke half as often; their times are those of every second position.
@@ -132,8 +132,8 @@ fn topics_are_joined_in_time_and_it_is_said_how() {
         assert_eq!(log.torque[j][k], csv.torque[j][2 * k]);
         assert!((log.q[j][k] - csv.q[j][2 * k]).abs() < 1e-6);
     }
-    let told = findings.iter().map(ToString::to_string).collect::<String>();
-    assert!(told.contains("torques of /drives with positions of /encoders"), "{told}");
+    let notes = findings.iter().map(ToString::to_string).collect::<String>();
+    assert!(notes.contains("torques of /drives with positions of /encoders"), "{notes}");
 }
 
 #[test]
@@ -264,7 +264,7 @@ fn a_bag_in_the_order_of_the_alphabet_is_identified_in_the_order_of_the_chain() 
     assert!(done["sentence"].as_str().unwrap().starts_with("Same arm"));
     assert!(folder.join("compared/report.html").is_file());
 
-    // What a model predicts goes out beside what was measured.
+    // What a model predicts is written next to what was measured.
     let (model, torque) = (shown(&folder.join("a/identified.json")), shown(&folder.join("torque.mcap")));
     let done = powerball(&[
         "log", &csv, "--arm", &arm_file, "--model", &model, "--to", "mcap", "--force", "-o", &torque,
@@ -279,7 +279,8 @@ fn a_bag_in_the_order_of_the_alphabet_is_identified_in_the_order_of_the_chain() 
     }
 }
 
-/// Every line that the layouts beside an MCAP draw is a column of a topic of it, and the last parts of their names are these.
+/// Every line that the layouts next to an MCAP draw is a column of a topic of it, and the last parts of their
+/// names are these.
 fn layouts_name_what_is_there(mcap: &Path, members: &[&str]) {
     let tables = read_contents(mcap).unwrap().tables;
     let has = |topic: &str, column: &str| {
@@ -337,7 +338,7 @@ fn logs_go_out_in_every_format_and_come_back() {
 }
 
 #[test]
-fn torques_on_the_motors_side_are_kept_beside() {
+fn torques_on_the_motors_side_are_kept_too() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("logs_motor");
     std::fs::create_dir_all(&folder).unwrap();
     let text = std::fs::read_to_string(data("log.csv")).unwrap();
@@ -349,8 +350,8 @@ fn torques_on_the_motors_side_are_kept_beside() {
     let motor = log.motor.unwrap();
     let dq2 = log.t.iter().map(|t| -3.0 * (3.0 * t).sin());
     assert!(motor[0].iter().zip(dq2).all(|(motor, dq2)| (motor - dq2).abs() < 1e-9));
-    let told = findings.iter().map(ToString::to_string).collect::<String>();
-    assert!(told.contains("motor: kept beside the torques"), "{told}");
+    let notes = findings.iter().map(ToString::to_string).collect::<String>();
+    assert!(notes.contains("motor: kept in addition to the torques"), "{notes}");
 }
 
 fn powerball(arguments: &[&str]) -> Output {
@@ -389,7 +390,7 @@ fn the_command_says_what_is_in_a_file() {
     assert_eq!(powerball(&["log", "nowhere.mcap"]).status.code(), Some(2));
 }
 
-/// With and without an arm: what is in a file as a page with figures, and as JSON beside it.
+/// With and without an arm: what is in a file as a page with figures, and as JSON next to it.
 #[test]
 fn a_look_into_a_log_is_a_page_with_figures() {
     let folder = std::env::temp_dir().join(format!("powerball_look_{}", std::process::id()));
@@ -410,9 +411,9 @@ fn a_look_into_a_log_is_a_page_with_figures() {
     for word in ["/encoders", "/drives", "position.shoulder", "effort.elbow", "Topics in time"] {
         assert!(plain.contains(word), "{word}");
     }
-    let told: Value = serde_json::from_slice(&std::fs::read(out.join("log.json")).unwrap()).unwrap();
-    assert_eq!(told["files"][0]["tables"].as_array().unwrap().len(), 2);
-    assert!(told["files"][0]["tables"][0].get("times").is_none());
+    let json: Value = serde_json::from_slice(&std::fs::read(out.join("log.json")).unwrap()).unwrap();
+    assert_eq!(json["files"][0]["tables"].as_array().unwrap().len(), 2);
+    assert!(json["files"][0]["tables"][0].get("times").is_none());
 
     let map = JOINTS.trim();
     let with_arm = ["log", file, "--arm", arm_file.to_str().unwrap(), "--map", map, "--out", out_text];

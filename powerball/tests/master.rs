@@ -49,7 +49,7 @@ fn rests(bus: &Memory<VirtualArm>) {
     }
 }
 
-/// A bus whose controller says something besides.
+/// A bus whose controller reports something in addition.
 #[derive(Debug)]
 struct Telling<B>(B, Option<Event>);
 

@@ -54,8 +54,8 @@ fn figures_of(explained: &Explained, name: &str) -> serde_json::Value {
     figures(explained.effects.iter().find(|e| e.effect == name).unwrap())
 }
 
-/// The load on the flange is a payload in its log alone, and beside it the load friction is found that every log
-/// shows: held-out errors fall.
+/// The load on the flange is a payload in its log alone, and in addition the load friction is found that
+/// every log shows: held-out errors fall.
 fn the_load_and_the_load_friction_of_the_ur10e_are_found(fit: &[&str], validate: &[&str]) {
     let Some(explained) = ur10e(fit, validate) else { return };
     let payload = explained.effects.iter().find(|e| e.effect == "payload").unwrap();
@@ -230,7 +230,8 @@ fn every_push_on_the_ur5_is_found() {
     }
 }
 
-/// The same hand in the log that judges: nothing of it can be learnt from the others, and the log is the one that differs.
+/// A hand on the UR5 in the log that judges: nothing of it can be learnt from the others, and the log is the
+/// one that differs.
 #[test]
 fn pushes_in_the_validation_log_only_are_found_and_the_log_differs() {
     let named = |logs: &[&str]| -> Vec<String> { logs.iter().map(ToString::to_string).collect() };
@@ -252,7 +253,7 @@ fn pushes_in_the_validation_log_only_are_found_and_the_log_differs() {
 
 /// What a person writes wrong: each is found in the file, and nothing is in the file as it is.
 #[test]
-fn what_is_wrong_in_the_arm_file_of_the_ur10e_is_told() {
+fn what_is_wrong_in_the_arm_file_of_the_ur10e_is_reported() {
     let Some(folder) = data().map(|data| data.join("ur10e")) else { return };
     let text = std::fs::read_to_string(folder.join("arm.toml")).unwrap();
     let names = ["12a", "7", "8", "12b", "5"];
@@ -265,9 +266,9 @@ fn what_is_wrong_in_the_arm_file_of_the_ur10e_is_told() {
         let arm = Arm::parse(&text.replace(right, wrong), "arm.toml").unwrap();
         let (mut logs, _) = read_logs(&files, &arm).unwrap();
         let validate = logs.split_off(4);
-        let told = conventions(&RigidArm::new(&arm).unwrap(), &logs, &validate);
-        assert_eq!(told.arm_file.as_deref(), line, "{}", told.evidence);
-        assert_eq!(told.differ(), line.is_some(), "{}", told.evidence);
+        let found = conventions(&RigidArm::new(&arm).unwrap(), &logs, &validate);
+        assert_eq!(found.arm_file.as_deref(), line, "{}", found.evidence);
+        assert_eq!(found.differ(), line.is_some(), "{}", found.evidence);
     }
 }
 
@@ -283,7 +284,7 @@ fn a_balanced_arm_is_not_said_to_have_no_gravity_in_its_torques() {
         let files = [fit, validate].map(|name| folder.join(format!("{name}.csv")));
         let (mut logs, _) = read_logs(&files, &arm).unwrap();
         let held_out = logs.split_off(1);
-        let told = conventions(&body, &logs, &held_out);
-        assert!(!told.differ(), "{fit}, {validate}: {}", told.evidence);
+        let found = conventions(&body, &logs, &held_out);
+        assert!(!found.differ(), "{fit}, {validate}: {}", found.evidence);
     }
 }

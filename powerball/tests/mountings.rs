@@ -88,7 +88,7 @@ fn logs_of_two_mountings_come_to_one_model() {
     let full = of("consistent.json").of_set(&model, model.set(dyngen::SetKind::Full).unwrap()).unwrap();
     assert!(dyngen::consistency::check(&model, dyngen::SetKind::Full, &full).unwrap().possible);
 
-    // Verified in the other mounting as it was judged there; told of the wrong one, not.
+    // Verified in the other mounting as it was judged there; with the wrong one stated, not.
     let verify = |log: &str, mounting: &str| {
         powerball(&format!(
             "verify --arm {arm} --model {out}/identified.json --log {log} {mounting} --out {out} --tolerance \
@@ -105,13 +105,16 @@ fn logs_of_two_mountings_come_to_one_model() {
     assert_eq!(unseen.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&unseen.stderr).contains("in mountings that do not determine it"));
 
-    // A mounting told wrong is doubted; what cannot be is refused.
+    // A mounting that is stated wrongly is doubted; what cannot be is refused.
     let wrong = json(&powerball(&format!(
         "identify --arm {arm} --log {up} --mounting 0,90 --log {side} --out {out} --json"
     )));
     let warnings: Vec<&str> =
         wrong["warnings"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
-    assert!(warnings.iter().any(|w| w.contains("is the mounting of each log told right")), "{warnings:?}");
+    assert!(
+        warnings.iter().any(|w| w.contains("is the mounting of each log stated correctly")),
+        "{warnings:?}"
+    );
     for (rest, reason) in [
         (
             format!("identify --log {up} --mounting 0,90 --log {summary}"),

@@ -1,5 +1,5 @@
-//! Logs that cannot show what they are asked for: what `identify` and `explain` say of them, and how they
-//! end.
+//! Logs that cannot show what they are asked for: what `identify` and `explain` report about them, and how
+//! they end.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 

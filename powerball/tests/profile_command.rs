@@ -1,4 +1,4 @@
-//! `powerball profile`: files to a table, and what it says of files that are wrong.
+//! `powerball profile`: files to a table, and what it reports about files that are wrong.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test's helpers may stop the test")]
 
@@ -40,66 +40,66 @@ fn the_scale_is_taken_from_the_drives_file() {
     std::fs::write(&toml, &other).unwrap();
     std::fs::write(&dcf, DRIVE).unwrap();
     let output = profile(&dcf, &toml, &out);
-    let told = String::from_utf8(output.stderr).unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
     assert!(
-        output.status.code() == Some(2) && told.contains("other.toml: node 3: counts_per_degree"),
-        "{told}"
+        output.status.code() == Some(2) && message.contains("other.toml: node 3: counts_per_degree"),
+        "{message}"
     );
 
     let encoder = "[608Fsub1]\nDataType=7\nDefaultValue=2000\n[608Fsub2]\nDataType=7\nDefaultValue=1\n";
     std::fs::write(&dcf, format!("{DRIVE}{encoder}")).unwrap();
     let output = profile(&dcf, &toml, &out);
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success() && told.contains("2000 counts a turn"), "{told}");
-    assert!(told.contains("[mode.velocity] is left out"), "{told}");
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && message.contains("2000 counts a turn"), "{message}");
+    assert!(message.contains("[mode.velocity] is left out"), "{message}");
     let made = std::fs::read_to_string(&out).unwrap();
     assert!(made.contains("counts_per_radian: 0.005555555555555556 * MILLIDEGREES_PER_RADIAN"), "{made}");
 
     std::fs::write(&toml, arm.replace("sync_timeout_factor", "# ")).unwrap();
     let output = profile(&dcf, &toml, &out);
-    let told = String::from_utf8(output.stderr).unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
     assert!(
-        output.status.success() && told.contains("360000 counts a turn, the drive's file says 2000"),
-        "{told}"
+        output.status.success() && message.contains("360000 counts a turn, the drive's file says 2000"),
+        "{message}"
     );
 }
 
 #[test]
-fn what_is_wrong_is_told_with_its_line() {
+fn what_is_wrong_is_reported_with_its_line() {
     let out = scratch("never.rs");
     let (dcf, arm) = (scratch("broken.dcf"), here("lwa4p_bus.toml"));
     std::fs::write(&dcf, "[DeviceInfo]\nBaudRate_500=1\n[6040]\nDataType=six\n").unwrap();
     let output = profile(&dcf, &arm, &out);
     assert_eq!(output.status.code(), Some(2));
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert!(told.contains("broken.dcf: line 4") && told.contains("six"), "{told}");
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("broken.dcf: line 4") && message.contains("six"), "{message}");
 
     std::fs::write(&dcf, "[DeviceInfo]\nBaudRate_500=1\n").unwrap();
-    let told = String::from_utf8(profile(&dcf, &arm, &out).stderr).unwrap();
-    assert!(told.contains("broken.dcf: no writable 0x1016:1"), "{told}");
+    let message = String::from_utf8(profile(&dcf, &arm, &out).stderr).unwrap();
+    assert!(message.contains("broken.dcf: no writable 0x1016:1"), "{message}");
     // What is wrong in the arm's file is not the drive's.
     let toml = scratch("wrong.toml");
     let committed = std::fs::read_to_string(&arm).unwrap().replace("sync_timeout_factor", "# ");
     std::fs::write(&toml, committed.replace("node = 4", "node = 3")).unwrap();
     std::fs::write(&dcf, DRIVE).unwrap();
-    let told = String::from_utf8(profile(&dcf, &toml, &out).stderr).unwrap();
-    assert!(told.contains("wrong.toml: two joints"), "{told}");
+    let message = String::from_utf8(profile(&dcf, &toml, &out).stderr).unwrap();
+    assert!(message.contains("wrong.toml: two joints"), "{message}");
     // Where they contradict each other, both are named.
     std::fs::write(&toml, committed.replace("500_000", "800_000")).unwrap();
-    let told = String::from_utf8(profile(&dcf, &toml, &out).stderr).unwrap();
-    assert!(told.contains("broken.dcf and wrong.toml: the DCF does not offer 800000"), "{told}");
+    let message = String::from_utf8(profile(&dcf, &toml, &out).stderr).unwrap();
+    assert!(message.contains("broken.dcf and wrong.toml: the DCF does not offer 800000"), "{message}");
     let wide: Vec<u8> = "\u{feff}name".encode_utf16().flat_map(u16::to_le_bytes).collect();
     std::fs::write(&toml, wide).unwrap();
-    let told = String::from_utf8(profile(&dcf, &toml, &out).stderr).unwrap();
-    assert!(told.contains("wrong.toml: is UTF-16"), "{told}");
+    let message = String::from_utf8(profile(&dcf, &toml, &out).stderr).unwrap();
+    assert!(message.contains("wrong.toml: is UTF-16"), "{message}");
 
     // Of several files the one that is wrong is named.
     let overlay = scratch("overlay.dcf");
     std::fs::write(&overlay, "[1003Value]\n1=0\n").unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_powerball"));
     command.arg("profile").arg("--dcf").arg(&dcf).arg("--overlay").arg(&overlay).arg("--arm").arg(&arm);
-    let told = String::from_utf8(command.arg("-o").arg(&out).output().unwrap().stderr).unwrap();
-    assert!(told.contains("overlay.dcf: line 2: [1003Value] lists 1"), "{told}");
+    let message = String::from_utf8(command.arg("-o").arg(&out).output().unwrap().stderr).unwrap();
+    assert!(message.contains("overlay.dcf: line 2: [1003Value] lists 1"), "{message}");
 
     let output = profile(Path::new("not/there.dcf"), &arm, &out);
     assert_eq!(output.status.code(), Some(2));

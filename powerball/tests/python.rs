@@ -29,9 +29,10 @@ fn agree(kind: &str) {
     }
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/python/agree.py");
     let run = Command::new(&python).args([script, env!("CARGO_BIN_EXE_powerball"), kind]).output().unwrap();
-    let told = [run.stdout, run.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).join("\n");
-    println!("{told}");
-    assert!(run.status.success(), "{told}");
+    let printed =
+        [run.stdout, run.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).join("\n");
+    println!("{printed}");
+    assert!(run.status.success(), "{printed}");
 }
 
 #[test]

@@ -1,5 +1,5 @@
-//! `powerball watch` on a small arm: what changes in the middle of a log is one event, and what cannot be watched is said
-//! before anything is computed.
+//! `powerball watch` on a small arm: what changes in the middle of a log is one event, and what cannot be
+//! watched is reported before anything is computed.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 

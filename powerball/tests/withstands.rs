@@ -228,14 +228,14 @@ fn leaves_operational(frame: &Frame) -> bool {
     Cob::of(frame) == Some(Cob::Nmt) && frame.bytes() == [0x80, 0]
 }
 
-/// The joint whose drive is told to stop quickly by this frame, an SDO to 0x6040.
+/// The joint whose drive is commanded to stop quickly by this frame, an SDO to 0x6040.
 fn quick_stop(frame: &Frame) -> Option<usize> {
     let of =
         |joint: &powerball::bus::driver::JointProfile| Cob::of(frame) == Some(Cob::SdoRequest(joint.node));
     LWA4P.joints.iter().position(of).filter(|_| frame.bytes() == [0x2B, 0x40, 0x60, 0, 2, 0, 0, 0])
 }
 
-/// The current that a joint is told while it is enabled in current mode.
+/// The current that a joint is commanded while it is enabled in current mode.
 fn current(frame: &Frame) -> bool {
     matches!(Cob::of(frame), Some(Cob::Rpdo(1, _))) && matches!(frame.bytes(), [0x0F, 0, _, _])
 }
@@ -294,7 +294,7 @@ fn a_process_that_is_killed_in_motion_leaves_a_stop_on_the_bus() {
             }
         }
         let slowest = stopped.into_iter().flatten().max().unwrap();
-        println!("{name}: out of operational after {left:?}, all joints told to stop after {slowest:?}");
+        println!("{name}: out of operational after {left:?}, all joints commanded to stop after {slowest:?}");
         assert!(left.unwrap() <= slowest && slowest < Duration::from_millis(100), "{slowest:?}");
         assert!(!run.0.wait().unwrap().success());
         // It says so, ends, and the arm has no torque.
@@ -327,6 +327,6 @@ fn a_watchdog_is_silent_where_the_arm_came_to_rest() {
     assert!(held.status.success(), "{}", String::from_utf8_lossy(&held.stderr));
     assert!(running_with(&url).is_empty());
     std::thread::sleep(Duration::from_millis(300));
-    let told: Vec<Frame> = heard.try_iter().map(|(_, frame)| frame).collect();
-    assert!(told.len() > 500 && told.iter().all(|f| !leaves_operational(f) && quick_stop(f).is_none()));
+    let frames: Vec<Frame> = heard.try_iter().map(|(_, frame)| frame).collect();
+    assert!(frames.len() > 500 && frames.iter().all(|f| !leaves_operational(f) && quick_stop(f).is_none()));
 }

@@ -1,4 +1,4 @@
-"""How fast the package is beside the command and beside Pinocchio; all ratios are of one run.
+"""How fast the package is compared with the command and with Pinocchio; all ratios are of one run.
 
 python speed.py POWERBALL       (the path of the command `powerball`)
 """
@@ -24,8 +24,8 @@ def cpu(work, times: int = 3) -> float:
     """Least processor time of a piece of work, children included, s."""
 
     def spent() -> float:
-        told = os.times()
-        return told.user + told.system + told.children_user + told.children_system
+        used = os.times()
+        return used.user + used.system + used.children_user + used.children_system
 
     def once() -> float:
         before = spent()

@@ -37,7 +37,7 @@ pub(crate) struct Arm {
     evaluators: Mutex<BTreeMap<(&'static str, SetKind), Arc<Evaluator>>>,
 }
 
-/// Position limits, velocity, acceleration, torque, torque constant: what the file says of a joint.
+/// Position limits, velocity, acceleration, torque, torque constant: what the file states about a joint.
 type Limits = (Option<[f64; 2]>, Option<f64>, Option<f64>, Option<f64>, Option<f64>);
 
 impl Arm {
@@ -219,7 +219,7 @@ impl Arm {
         self.arm.frames.iter().map(|frame| frame.name.clone()).collect()
     }
 
-    /// The same arm with its tool at one of its frames.
+    /// This arm with its tool at one of its frames.
     fn at_frame(&self, name: &str) -> PyResult<Arm> {
         let arm = self.arm.at_frame(name).ok_or_else(|| {
             value(format!("the arm has no frame '{name}': it has {}", self.frames().join(", ")))

@@ -28,7 +28,7 @@ pub(crate) struct Taken {
     pub(crate) findings: Vec<String>,
 }
 
-/// The map of what was said of columns.
+/// The map of what was given for columns.
 pub(crate) fn column_map(said: &[String]) -> PyResult<Arc<ColumnMap>> {
     ColumnMap::said(said).map(Arc::new).map_err(input)
 }

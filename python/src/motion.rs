@@ -64,7 +64,7 @@ impl Excited {
     }
 }
 
-/// What `powerball excite` is told, by the names of its flags.
+/// The options of `powerball excite`, by the names of its flags.
 #[derive(FromPyObject)]
 pub(crate) struct Asked {
     parameters: String,
@@ -76,7 +76,7 @@ pub(crate) struct Asked {
     objective: String,
     weight: f64,
     mounting: Vec<String>,
-    /// A height, "none", or nothing said.
+    /// A height, "none", or nothing given.
     floor: Option<Floor>,
     radius: Option<f64>,
     clearance: Option<f64>,

@@ -15,7 +15,7 @@ pub(crate) fn virtual_effects() -> Vec<&'static str> {
     names()
 }
 
-/// Records a session with an arm of which the model is not told everything.
+/// Records a session with an arm of which the model does not know everything.
 #[pyfunction]
 #[pyo3(signature = (folder, seed, effect, progress))]
 pub(crate) fn virtual_session(

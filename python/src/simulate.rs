@@ -78,7 +78,7 @@ pub(crate) fn simulate<'py>(
     arrays(py, &moved, dof)
 }
 
-/// The same with a function of Python: t, q, dq, and the path's q, dq, ddq to n torques.
+/// A simulation with a function of Python: t, q, dq, and the path's q, dq, ddq to n torques.
 #[pyfunction]
 #[pyo3(signature = (arm, plant, controller, period, path))]
 pub(crate) fn simulate_function<'py>(

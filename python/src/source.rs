@@ -82,7 +82,8 @@ pub(crate) fn description(path: PathBuf) -> PyResult<String> {
     Ok(Source::read(&path).map_err(input)?.text)
 }
 
-/// A copy of the robot description that the arm was imported from, with values; and what is to be said of it.
+/// A copy of the robot description that the arm was imported from, with values; and what is to be reported
+/// about it.
 #[pyfunction]
 #[pyo3(signature = (arm, values, friction, uncertain))]
 pub(crate) fn export_imported(

@@ -48,7 +48,7 @@ impl Summary {
         self.bands.widest().joints.iter().map(|joint| joint.rows()).collect()
     }
 
-    /// What is to be said of the logs.
+    /// What is to be reported about the logs.
     fn warnings(&self) -> Vec<String> {
         self.warnings.clone()
     }

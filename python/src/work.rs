@@ -18,7 +18,7 @@ const STACK: usize = 8 << 20;
 enum Message<T> {
     /// What it is doing now.
     Said(String),
-    /// Its result.
+    /// The result of the work.
     Done(T),
 }
 

@@ -64,7 +64,7 @@ def test_a_fleet_is_one_process(short_logs, tmp_path):
         done = fleet.run(client, job, str(logs / "*.csv"))
         assert done.known == 10 and len(done.workers) == 2
         assert sum(count for _, count in done.workers.values()) == LOGS - 10 + 1
-        # The broken one is told, and the others went on.
+        # The broken one is reported, and the others went on.
         (name, why), *more = done.failed.items()
         assert name.endswith("broken.csv") and "q2" in why and not more
 
@@ -99,7 +99,7 @@ def bucket(request, monkeypatch):
             "AWS_DEFAULT_REGION": "us-east-1",
         }.items():
             monkeypatch.setenv(name, value)
-    # What was opened before may have been told of another server.
+    # What was opened before may be set to another server.
     fsspec.get_filesystem_class(request.param).clear_instance_cache()
     with distributed.Client(
         processes=False, n_workers=2, threads_per_worker=1, dashboard_address=None

@@ -202,5 +202,5 @@ def test_the_command_says_the_same(tmp_path, rng):
         tmp_path / "s.csv", np.hstack([q, dq, ddq]), delimiter=",", header=header, comments="", fmt="%.17g"
     )
     done = command("dyngen", "eval", toml, "--function", "regressor", "--states", tmp_path / "s.csv")
-    told = np.loadtxt(done.stdout.splitlines()[1:], delimiter=",")
-    np.testing.assert_array_equal(arm.regressor(q, dq, ddq).reshape(3, -1), told)
+    printed = np.loadtxt(done.stdout.splitlines()[1:], delimiter=",")
+    np.testing.assert_array_equal(arm.regressor(q, dq, ddq).reshape(3, -1), printed)

@@ -107,7 +107,7 @@ def test_time_stamps_and_summaries(session, arm, tmp_path):
     np.testing.assert_allclose(values, expected, rtol=1e-9)
 
 
-def test_columns_that_are_no_numbers_are_told(session, arm):
+def test_columns_that_are_no_numbers_are_reported(session, arm):
     log = {**table(session.log[0]), "operator": np.array(["somebody"] * len(table(session.log[0])["t"]))}
     found = pb.identify(arm, log)
     assert any("operator" in warning for warning in found.warnings), found.warnings
@@ -190,10 +190,10 @@ def test_thresholds_are_the_programs_and_can_be_given(session, arm):
 
 
 def test_explain_is_the_commands_and_its_model_goes_on(session, arm, tmp_path):
-    told = []
+    messages = []
     log, validate = session.log[:3], session.validate[:1]
-    explained = pb.explain(arm, log, validate, progress=told.append)
-    assert len(told) > 3 and all(isinstance(what, str) for what in told)
+    explained = pb.explain(arm, log, validate, progress=messages.append)
+    assert len(messages) > 3 and all(isinstance(what, str) for what in messages)
     done = command(
         "powerball",
         *("explain", "--arm", session.arm_file, "--log", *log),
@@ -259,12 +259,12 @@ def test_numbers_for_ros_are_the_models(arm, session, identified, tmp_path):
         *("--yaml", tmp_path / "arm.yaml", "--json"),
     )
     assert done.returncode == 0, done.stderr
-    told = yaml.safe_load((tmp_path / "arm.yaml").read_text())["/**"]["ros__parameters"]["torque_model"]
-    assert dict(zip(told["inertial"]["names"], told["inertial"]["values"])) == identified.values
-    assert told["gravity"] == [0.0, 0.0, -9.81] and told["encoder_offset"] == [0.0] * 6
-    assert told["joints"] == [f"joint{j}" for j in range(1, 7)]
-    for name, friction in zip(told["joints"], identified.friction):
-        own = told["friction"][name]
+    numbers = yaml.safe_load((tmp_path / "arm.yaml").read_text())["/**"]["ros__parameters"]["torque_model"]
+    assert dict(zip(numbers["inertial"]["names"], numbers["inertial"]["values"])) == identified.values
+    assert numbers["gravity"] == [0.0, 0.0, -9.81] and numbers["encoder_offset"] == [0.0] * 6
+    assert numbers["joints"] == [f"joint{j}" for j in range(1, 7)]
+    for name, friction in zip(numbers["joints"], identified.friction):
+        own = numbers["friction"][name]
         assert [own[f"gamma{k}"] for k in range(1, 6)] == list(friction.gamma)
         assert own["coulomb"] == friction.gamma[0] + friction.gamma[2] and own["viscous"] == friction.gamma[4]
 

@@ -49,7 +49,7 @@ def test_the_effect_that_a_controller_knows_is_not_in_the_error(arm):
     base = pb.simulate(arm, model(arm), "computed_torque", path(), plant=plant, bandwidth=20)
     explained = pb.simulate(arm, plant, "computed_torque", path(), bandwidth=20)
     assert explained.rms[0] < 0.1 * base.rms[0]
-    # At rest a spring of k·q leaves k·q/(B·ω²); the path is slow beside ω.
+    # At rest a spring of k·q leaves k·q/(B·ω²); the path is slow compared with ω.
     assert base.rms[0] == pytest.approx(8.0 * np.sqrt(np.mean(base.q[:, 0] ** 2)) / (0.5 * 400), rel=0.15)
 
 

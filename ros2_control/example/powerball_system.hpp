@@ -44,7 +44,7 @@ public:
         return CallbackReturn::FAILURE;
       }
       // How the base stands and what the arm weighs: no set-point leaves that takes more torque than a joint has.
-      if (!told(powerball_guard_model(arm_, parameter("mounting"), parameter("values")))) {
+      if (!check(powerball_guard_model(arm_, parameter("mounting"), parameter("values")))) {
         return CallbackReturn::FAILURE;
       }
       const char * accept = parameter("accept_unverified");
@@ -52,7 +52,7 @@ public:
         powerball_accept_unverified(arm_);
       }
     }
-    return told(powerball_configure(arm_)) ? CallbackReturn::SUCCESS : CallbackReturn::FAILURE;
+    return check(powerball_configure(arm_)) ? CallbackReturn::SUCCESS : CallbackReturn::FAILURE;
   }
 
   CallbackReturn on_cleanup(const rclcpp_lifecycle::State &) override
@@ -64,7 +64,7 @@ public:
 
   CallbackReturn on_activate(const rclcpp_lifecycle::State &) override
   {
-    if (!told(powerball_activate(arm_)) || !told(read_all())) {
+    if (!check(powerball_activate(arm_)) || !check(read_all())) {
       return CallbackReturn::FAILURE;
     }
     // Where the arm is, until a controller says otherwise.
@@ -74,10 +74,10 @@ public:
 
   CallbackReturn on_deactivate(const rclcpp_lifecycle::State &) override
   {
-    return told(powerball_deactivate(arm_)) ? CallbackReturn::SUCCESS : CallbackReturn::ERROR;
+    return check(powerball_deactivate(arm_)) ? CallbackReturn::SUCCESS : CallbackReturn::ERROR;
   }
 
-  // The arm stands, its cause was told; it is configured and activated again by whoever looks after it.
+  // The arm stands, its cause was reported; it is configured and activated again by whoever looks after it.
   CallbackReturn on_error(const rclcpp_lifecycle::State &) override
   {
     const bool stands = powerball_on_error(arm_) != POWERBALL_ERROR;
@@ -108,13 +108,14 @@ public:
 
   return_type read(const rclcpp::Time &, const rclcpp::Duration &) override
   {
-    return told(read_all()) ? return_type::OK : return_type::ERROR;
+    return check(read_all()) ? return_type::OK : return_type::ERROR;
   }
 
   return_type write(const rclcpp::Time &, const rclcpp::Duration &) override
   {
-    // A refusal is told; the driver goes on as it went and stops the arm with the third, which read then tells.
-    told(powerball_write(arm_, command_.data()));
+    // A refusal is reported; the driver goes on as it went and stops the arm with the third, which read then
+    // reports.
+    check(powerball_write(arm_, command_.data()));
     return return_type::OK;
   }
 
@@ -130,7 +131,7 @@ private:
 
   int read_all() { return powerball_read(arm_, position_.data(), velocity_.data(), effort_.data()); }
 
-  bool told(int code)
+  bool check(int code)
   {
     if (code == POWERBALL_ERROR) {
       std::fprintf(stderr, "powerball: %s\n", powerball_message(arm_));

@@ -62,9 +62,10 @@ impl Arm {
         self.master.driver_mut().guard_torque(guard);
     }
 
-    /// The same with the model of the built-in arm, mounted as said (`filed`, `ROLL,PITCH` in degrees, or gravity in the
-    /// base frame as `X,Y,Z` in m/s²). Masses and friction are those of an identified.json or a values file, or, where
-    /// there is none, the CAD model's and the published friction. It allocates in each [`Arm::write`].
+    /// As [`Self::guard_torque`], with the model of the built-in arm, mounted as stated (`filed`,
+    /// `ROLL,PITCH` in degrees, or gravity in the base frame as `X,Y,Z` in m/s²). Masses and friction are
+    /// those of an identified.json or a values file, or, where there is none, the CAD model's and the
+    /// published friction. It allocates in each [`Arm::write`].
     ///
     /// # Errors
     /// A mounting or a file that cannot be read, in words.
@@ -236,13 +237,13 @@ mod tests {
         let mut arm = active();
         let mut position = arm.read().unwrap().position;
         position[2] += 0.5;
-        let mut told = Vec::new();
+        let mut refusals = Vec::new();
         let stopped = (0..10).find_map(|_| {
-            told.extend(arm.write(&position).err());
+            refusals.extend(arm.write(&position).err());
             arm.read().err()
         });
-        assert!(told[0].contains("joint 3"), "{told:?}");
-        assert!(stopped.is_some_and(|why| why.contains("rejected")), "{told:?}");
+        assert!(refusals[0].contains("joint 3"), "{refusals:?}");
+        assert!(stopped.is_some_and(|why| why.contains("rejected")), "{refusals:?}");
         assert!(arm.activate().is_err());
         assert!(arm.on_error().unwrap());
         arm.activate().unwrap();
@@ -250,7 +251,7 @@ mod tests {
     }
 
     /// A joint that the model says has no torque beyond a place stops before it; the built-in model holds nothing back
-    /// that the arm can do, and a mounting or a file that is none is told.
+    /// that the arm can do, and a mounting or a file that is none is reported.
     #[test]
     fn what_takes_more_torque_than_a_joint_has_does_not_leave() {
         let mut arm = Arm::open("virtual").unwrap();
@@ -267,8 +268,8 @@ mod tests {
             // What goes on as it went would have no torque either: the driver stops the arm.
             assert!(arm.read().is_ok() || refused.is_some());
         }
-        let told = refused.unwrap();
-        assert!(told.contains("joint 6") && told.contains("N·m"), "{told}");
+        let refusal = refused.unwrap();
+        assert!(refusal.contains("joint 6") && refusal.contains("N·m"), "{refusal}");
         assert!((position[5] - 0.05).abs() < 2e-4, "{position:?}");
 
         let mut arm = Arm::open("virtual").unwrap();

@@ -121,7 +121,8 @@ impl Callback {
     }
 }
 
-/// See [`Arm::guard_torque`]. What the guard needs beside the caller's own stays in memory until the program ends.
+/// See [`Arm::guard_torque`]. What the guard needs in addition to the caller's own stays in memory until the
+/// program ends.
 ///
 /// # Safety
 /// `handle` is null or an open arm's that nobody else uses now; `torque` is null or may be called with `context` until

@@ -18,7 +18,7 @@ mod zencan {
 }
 
 const NODE: NodeId = NodeId::clamped(5);
-const TOLD: Object = Object::new(0x2000, 0);
+const COMMANDED: Object = Object::new(0x2000, 0);
 const KEPT: Object = Object::new(0x2001, 0);
 
 struct Zencan {
@@ -104,19 +104,21 @@ fn a_node_of_zencan_is_mastered() {
     };
     // Who it is; its name comes in segments.
     for (sub, value) in [(1, 0xCAFEi64), (2, 1032), (3, 7)] {
-        let told = read(&mut bus, Object::new(0x1018, sub)).unwrap();
-        assert_eq!(told.as_slice(), Value::number(value, 4).as_slice());
+        let part = read(&mut bus, Object::new(0x1018, sub)).unwrap();
+        assert_eq!(part.as_slice(), Value::number(value, 4).as_slice());
     }
     let name = read(&mut bus, Object::new(0x1008, 0)).unwrap();
     assert_eq!(name.as_slice(), b"a node of zencan");
-    write(&mut bus, TOLD, 0xBEEF, 2);
+    write(&mut bus, COMMANDED, 0xBEEF, 2);
     write(&mut bus, KEPT, -77_000, 4);
     let refused = read(&mut bus, Object::new(0x2FFF, 0)).unwrap_err().to_string();
     assert!(refused.contains("0x06020000"), "{refused}");
 
     // PDOs as the driver sets them: off, count 0, entries, count, type, on.
-    let (rpdo, tpdo) =
-        (Mapping::of(&[Entry::new(KEPT, 32)]), Mapping::of(&[Entry::new(TOLD, 16), Entry::new(KEPT, 32)]));
+    let (rpdo, tpdo) = (
+        Mapping::of(&[Entry::new(KEPT, 32)]),
+        Mapping::of(&[Entry::new(COMMANDED, 16), Entry::new(KEPT, 32)]),
+    );
     for (base, cob, mapping, kind) in
         [(0x1400, Cob::Rpdo(1, NODE), rpdo, 255), (0x1800, Cob::Tpdo(1, NODE), tpdo, 1)]
     {
@@ -140,8 +142,8 @@ fn a_node_of_zencan_is_mastered() {
         bus.send(&cob::SYNC).unwrap();
         let heard = hear(&mut bus, 5_000);
         let data = heard.iter().find(|frame| Cob::of(frame) == Some(Cob::Tpdo(1, NODE))).unwrap();
-        let told: Vec<u32> = tpdo.unpack(data.bytes()).unwrap().map(|(_, raw)| raw).collect();
-        assert_eq!(told, [0xBEEF, number as u32]);
+        let values: Vec<u32> = tpdo.unpack(data.bytes()).unwrap().map(|(_, raw)| raw).collect();
+        assert_eq!(values, [0xBEEF, number as u32]);
         assert_eq!(read(&mut bus, KEPT).unwrap().as_slice(), number.to_le_bytes());
     }
 

@@ -37,7 +37,7 @@ const CONSTANTS: [f64; 7] = [24.0, 24.0, 18.0, 12.0, 9.0, 9.0, 7.0];
 
 type Spoil<'a> = Box<dyn Fn(&mut Log) + 'a>;
 
-/// Prints a table: what was made wrong, what is told, and the column map.
+/// Prints a table: what was made wrong, what is reported, and the column map.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let (arm, logs, validate) = match &arguments.arm {
         Some(file) => {
@@ -70,7 +70,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     if arguments.plain { Ok(()) } else { of_arm_files(&arm, &logs, &validate) }
 }
 
-/// Prints a table: what was made wrong with the arm file, the line that is told, and what else fits as well.
+/// Prints a table: what was made wrong with the arm file, the line that is reported, and what else fits as
+/// well.
 fn of_arm_files(arm: &Arm, logs: &[Log], validate: &[Log]) -> Result<(), String> {
     println!("\n| wrong in the arm file | reported | or | s |\n|---|---|---|---|");
     for (name, wrong) in wrong_files(arm) {
@@ -135,7 +136,7 @@ fn wrong_files(arm: &Arm) -> Vec<(String, Arm)> {
     all
 }
 
-/// What is other than it is said to be; otherwise what is not told.
+/// What differs from what is declared; otherwise what is not determined.
 fn words(asked: &Conventions) -> String {
     let of = |said: Option<bool>| asked.answers.iter().filter(move |a| a.as_said == said);
     if asked.differ() {
@@ -147,7 +148,7 @@ fn words(asked: &Conventions) -> String {
     let open: Vec<&str> = of(None).map(|a| a.question).collect();
     match open.is_empty() {
         true => "as said".into(),
-        false => format!("as said; not told: {}", open.join(", ")),
+        false => format!("as said; not determined: {}", open.join(", ")),
     }
 }
 

@@ -1,5 +1,5 @@
-//! What the base model leaves of each log when it is fitted to the others, beside a plain model on the same
-//! rows.
+//! What the base model leaves of each log when it is fitted to the others, compared with a plain model on the
+//! same rows.
 
 use super::textbook::{Plain, Squares};
 use dyngen::Arm;

@@ -36,7 +36,7 @@ enum Command {
     Textbook(textbook::Arguments),
     /// How often `compare` calls equal arms different, and sees what changed
     Compare(compare::Arguments),
-    /// What `explain` says of measured logs in which others, or a draw, put something, as a page
+    /// What `explain` reports about measured logs in which others, or a draw, put something, as a page
     KnownTruth(known_truth::Arguments),
     /// Whether names that three logs give are taken back by all of them
     Subsets(subsets::Arguments),

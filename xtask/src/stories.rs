@@ -74,7 +74,7 @@ fn cases() -> Vec<Case> {
                 _ => "SCHUNK arm, group B0: even repeats against odd ones",
             },
             question: "One torque input is repeated while the arm warms up. Even repeats are fitted, odd \
-                ones held out. Both run one path: what only fits that path cannot be told there.",
+                ones held out. Both run one path: what only fits that path cannot be determined there.",
             folder: "lwa4p_rollouts",
             fit: repeats(group, &mut (2..=count).step_by(2)),
             validate: repeats(group, &mut (1..=count).step_by(2)),
@@ -109,7 +109,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
             figures and all, by\n\n```sh\ncargo run --release -p xtask -- stories\n```\n\n\
          Figures show means over equal numbers of samples (purple without the effect but with all others, \
          blue with it, orange what it adds), torques \
-         against the direction of motion where that is said. [measured.md](../measured.md) has the results in \
+         against the direction of motion where that is stated. [measured.md](../measured.md) has the results in \
          short and describes the data, [explain.md](../explain.md) says what must be true \
          before a name is given, and \
          [study.md](../study.md) how often a name is right where the truth is known.\n",

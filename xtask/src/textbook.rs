@@ -22,7 +22,7 @@ pub(crate) struct Arguments {
     /// Logs to judge on
     #[arg(long, num_args = 1.., required = true)]
     validate: Vec<PathBuf>,
-    /// An explained.json of the same logs, whose errors are set beside these
+    /// An explained.json of the same logs, whose errors are set next to these
     #[arg(long)]
     explained: Option<PathBuf>,
 }
@@ -150,7 +150,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn errors_are_read_by_joint_and_what_lacks_them_is_told() {
+    fn errors_are_read_by_joint_and_what_lacks_them_is_reported() {
         let file = std::env::temp_dir().join(format!("textbook_{}.json", std::process::id()));
         fs::write(&file, r#"{"after": {"validate": {"relative": [0.25, null]}}}"#).unwrap();
         let read = relative(&file).unwrap();

@@ -14,9 +14,9 @@ const KEYS: [&str; 3] = ["joint", "ratio", "offset"];
 pub struct Mimic {
     /// The joint that it follows, from 0, which moves on its own.
     pub joint: usize,
-    /// Its velocity for a unit of the other's; not zero.
+    /// Velocity of the following joint for a unit of the other's; not zero.
     pub ratio: Rational,
-    /// Its position where the other's is zero, rad or m.
+    /// Position of the following joint where the other's is zero, rad or m.
     pub offset: Rational,
 }
 
@@ -102,7 +102,8 @@ impl Arm {
 }
 
 impl Joint {
-    /// What the joint's angle, as sines and cosines take it, holds beside q: theta where it is no multiple of pi/2.
+    /// What the joint's angle, as sines and cosines take it, holds in addition to q: theta where it is no
+    /// multiple of pi/2.
     pub(crate) fn theta_in_angle(&self) -> Angle {
         if self.theta.quarter_turns().is_some() { Angle::zero() } else { self.theta.clone() }
     }

@@ -44,14 +44,15 @@ pub enum JointKind {
 /// One row of the DH table with what else is known of the joint and its link.
 #[derive(Clone, PartialEq)]
 pub struct Joint {
-    /// Its name, where the file gives one: as in the URDF, and in the logs of others.
+    /// The joint's name, where the file gives one: as in the URDF, and in the logs of others.
     pub name: Option<String>,
     /// Revolute or prismatic.
     pub kind: JointKind,
     /// Link length, m.
     pub a: Rational,
-    /// What a row shifts along y beside `a`, before the twist, m: zero in a table of four numbers a row. Where
-    /// axes are almost parallel, whose common normal is far away, it lets frames stay near the arm.
+    /// What a row shifts along y in addition to `a`, before the twist, m: zero in a table of four numbers a
+    /// row. Where axes are almost parallel, whose common normal is far away, it lets frames stay near the
+    /// arm.
     pub b: Rational,
     /// Link twist.
     pub alpha: Angle,
@@ -123,7 +124,7 @@ pub struct Grouping {
 /// Where a frame stands in another, as a URDF says it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placement {
-    /// Its origin, m.
+    /// Origin of the frame, m.
     pub xyz: [Rational; 3],
     /// Roll, pitch and yaw: R = Rz(yaw)·Ry(pitch)·Rx(roll).
     pub rpy: [Angle; 3],
@@ -142,7 +143,7 @@ impl Placement {
 /// A frame that is fixed on a link: where kinematics can be asked for, as at the tool.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
-    /// Its name.
+    /// The frame's name.
     pub name: String,
     /// The link that carries it, from 0.
     pub link: usize,
@@ -224,14 +225,16 @@ impl Arm {
         read::parse(text, file)
     }
 
-    /// The same arm with its tool at one of its frames: what is asked of the tool is then asked of the frame.
+    /// This arm with its tool at one of its frames: what functions give for the tool they then give for the
+    /// frame.
     pub fn at_frame(&self, name: &str) -> Option<Arm> {
         let frame = self.frames.iter().find(|frame| frame.name == name)?;
         let (tool, tool_link) = (Some(frame.placement.clone()), Some(frame.link));
         Some(Arm { tool, tool_link, ..self.clone() })
     }
 
-    /// Of the arm's description, the same on every machine (FNV-1a, 64 bits): what a generated file says of its arm.
+    /// Hash of the arm's description, the same on every machine (FNV-1a, 64 bits): what a generated file
+    /// states about its arm.
     pub fn hash(&self) -> u64 {
         let step = |h: u64, b: u8| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3);
         format!("{self:?}").bytes().fold(0xcbf2_9ce4_8422_2325, step)
@@ -304,8 +307,8 @@ impl Arm {
     }
 
     /// The chain of a standard table in the modified convention, with frame i on joint i and every parameter
-    /// kept: the same axes and the same motion, but its links' parameters are told in other frames. It has no
-    /// tool.
+    /// kept: the same axes and the same motion, but its links' parameters are expressed in other frames. It
+    /// has no tool.
     pub(crate) fn on_joints(&self) -> Arm {
         let mut arm =
             Arm { convention: Convention::Modified, tool: None, frames: Vec::new(), ..self.clone() };

@@ -14,7 +14,7 @@ const KEYS: [&str; 2] = ["joints", "matrix"];
 /// its gear, by the sum over the block's joints of `matrix[k][j]`·q_j.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transmission {
-    /// Its joints, from 0, in the order of the matrix.
+    /// The coupled joints, from 0, in the order of the matrix.
     pub joints: Vec<usize>,
     /// Motor positions = matrix · joint positions, by rows; regular.
     pub matrix: Vec<Vec<Rational>>,
@@ -126,7 +126,7 @@ fn rows(reader: &mut Reader<'_>, v: &Value<'_>, place: &str, count: usize) -> Op
     let row = |list: &Value<'_>| -> Vec<Option<Rational>> {
         list.get_ref().as_array().map(|a| a.iter().map(&mut entry).collect()).unwrap_or_default()
     };
-    // All of them are read, so that each that is wrong is told.
+    // All of them are read, so that each that is wrong is reported.
     let read: Vec<Vec<Option<Rational>>> = lists.into_iter().map(row).collect();
     read.into_iter().map(|row| row.into_iter().collect()).collect()
 }

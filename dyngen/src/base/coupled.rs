@@ -17,7 +17,7 @@ pub(super) const CARRIED: usize = 4;
 /// A motor that turns with several joints.
 #[derive(Clone, Debug)]
 pub(super) struct CoupledMotor {
-    /// Its own joint.
+    /// The motor's own joint.
     pub(super) motor: usize,
     /// The last joint that it depends on.
     pub(super) last: usize,
@@ -31,14 +31,14 @@ pub(super) struct Carried<V> {
     pub(super) velocity: V,
     /// Twice the energy so far, from the motor's own joint on; before zero.
     pub(super) energy: V,
-    /// Its rate with μ, 2 k ω + 2 k² μ.
+    /// Rate of the energy with μ, 2 k ω + 2 k² μ.
     pub(super) rate: V,
     /// k²
     pub(super) square: V,
 }
 
 impl CoupledMotor {
-    /// Those of an arm whose joints have rotors.
+    /// The coupled motors of an arm whose joints have rotors.
     pub(super) fn all(arm: &Arm) -> Vec<CoupledMotor> {
         let of = |motor: usize| {
             arm.joints[motor].rotor_ratio.as_ref()?;

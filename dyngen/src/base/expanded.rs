@@ -226,7 +226,7 @@ fn row_key(row: &SparseRow) -> Vec<(usize, Vec<(Monomial, Rational)>)> {
     row.iter().map(|(c, n)| (*c, n.terms().to_vec())).collect()
 }
 
-/// The same columns depend in the same way, whichever rows say so: for known arms, arms with every kind of
+/// Columns depend in the same way, whichever rows are used: for known arms, arms with every kind of
 /// twist, with sliding joints, tilted gravity and rotors.
 #[test]
 fn the_rows_span_those_of_the_expanded_lagrangian() {

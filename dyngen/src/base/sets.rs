@@ -19,9 +19,9 @@ pub use super::plain::combination_text;
 /// How well the torques determine a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// Its column is zero.
+    /// The parameter's column is zero.
     Unidentifiable,
-    /// Its column depends on no other.
+    /// The parameter's column depends on no other.
     Alone,
     /// Only together with others.
     InCombination,

@@ -1,9 +1,9 @@
 //! What one joint makes of functionals of the motion before it: the step from link to link on a motion's
 //! monomials.
 //!
-//! A motion is told in axes whose z is the link's own joint axis, in the standard convention too: there the
-//! twist behind the joint is only in the link's columns and in the next step. Else every monomial would be
-//! mixed by it, and elimination makes fractions of that.
+//! A motion is expressed in axes whose z is the link's own joint axis, in the standard convention too: there
+//! the twist behind the joint is only in the link's columns and in the next step. Else every monomial would
+//! be mixed by it, and elimination makes fractions of that.
 
 use super::coupled::{CARRIED, Carried, CoupledMotor};
 use crate::arm::{Arm, Convention};
@@ -16,7 +16,7 @@ use crate::lagrangian::elements::{ArmElements, JointElements, Source, turn_x};
 use crate::lagrangian::{Motion, link_columns, step};
 use std::collections::BTreeMap;
 
-/// Whether the arm's sizes are numbers or variables beside q.
+/// Whether the arm's sizes are numbers or variables in addition to q.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sizes {
     /// The numbers in the file.
@@ -73,14 +73,15 @@ pub(super) struct Steps<'f> {
     /// The monomials of a motion, and the place of each.
     motion: Vec<Numerator>,
     place: BTreeMap<Monomial, usize>,
-    /// A body's ten inertial columns: for each the motion's monomials in it, the motion told in the body's axes.
+    /// A body's ten inertial columns: for each the motion's monomials in it, the motion expressed in the
+    /// body's axes.
     body: Vec<Values>,
-    /// The same for each link, the motion told as all are.
+    /// The columns of each link, the motion expressed as all are.
     columns: Vec<Vec<Values>>,
     /// Motors that turn with several joints.
     coupled: Vec<CoupledMotor>,
     /// For each of them the monomials of which its rotor's energy will be made. They are columns of a link
-    /// beside its own eleven; the first of five is the energy so far.
+    /// in addition to its own eleven; the first of five is the energy so far.
     pending: Vec<usize>,
 }
 
@@ -185,8 +186,8 @@ impl<'f> Steps<'f> {
         steps
     }
 
-    /// A motion's variables in the axes behind a joint's twist where the convention puts one there, or, told in
-    /// those, back in the axes before it.
+    /// A motion's variables in the axes behind a joint's twist where the convention puts one there, or,
+    /// expressed in those, back in the axes before it.
     fn turned(&self, joint: usize, back: bool) -> Motion<Numerator> {
         let mut motion = self.variables();
         if self.elements.convention == Convention::Standard {
@@ -312,7 +313,7 @@ impl<'f> Steps<'f> {
         let one = self.field.rational(rational::integer(1));
         let before = listed(self.turned(joint, true));
         let own = |variable: usize| &before[variable - self.first];
-        // What each monomial is in the body's axes; those of coupled motors are told in no others.
+        // What each monomial is in the body's axes; those of coupled motors are expressed in no others.
         let carried = self.pending.first().copied().unwrap_or(self.motion.len());
         let in_body: Vec<_> =
             self.motion[..carried].iter().map(|m| self.split(&image(&self.ring, m, &own))).collect();

@@ -8,7 +8,7 @@ use crate::arm::{Arm, Parameter};
 use crate::exact::elimination::{self, SparseRow, Unproven};
 use crate::parameters::Combination;
 
-/// What the torques would show of a parameter that is declared zero, beside those that are kept.
+/// What the torques would show of a parameter that is declared zero, in addition to those that are kept.
 #[derive(Clone, Debug)]
 pub enum Removed {
     /// Nothing: its column is zero, with or without the symmetry.

@@ -122,13 +122,13 @@ fn joint_table(t: &mut String, arm: &Arm, digits: Digits) {
             JointKind::Prismatic => "prismatic",
         };
         let number = |r: &Rational| digits.number(rational::to_f64(r));
-        let beside = if offsets { format!("  {:>8}", number(&joint.b)) } else { String::new() };
+        let offset = if offsets { format!("  {:>8}", number(&joint.b)) } else { String::new() };
         let rotor = joint.rotor_ratio.as_ref().map_or("-".to_string(), number);
         let zero: Vec<&str> = joint.zero.iter().map(|k| k.name()).collect();
         let (alpha, theta) = (digits.angle(&joint.alpha), digits.angle(&joint.theta));
         let _ = writeln!(
             t,
-            "  {:>2}  {:<width$}{kind:<9}  {:>8}{beside}  {alpha:>8}  {:>8}  {theta:>8}  {rotor:>6}  {}",
+            "  {:>2}  {:<width$}{kind:<9}  {:>8}{offset}  {alpha:>8}  {:>8}  {theta:>8}  {rotor:>6}  {}",
             i + 1,
             if width > 0 { names[i].as_str() } else { "" },
             number(&joint.a),

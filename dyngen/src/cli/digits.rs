@@ -37,16 +37,16 @@ impl Digits {
         if self == Digits::All || terms.iter().all(|(_, c)| short(c)) {
             return name.to_string();
         }
-        // Few rationals are left by then: each coefficient is told by the number it is.
-        let told = |(parameter, c): &(Parameter, Constant)| match c.as_rational().filter(|_| short(c)) {
+        // Few rationals are left by then: each coefficient is written as a number.
+        let written = |(parameter, c): &(Parameter, Constant)| match c.as_rational().filter(|_| short(c)) {
             Some(exact) => (parameter.to_string(), exact),
             None => {
                 let (sign, size) = (field.value(c) < 0.0, six(field.value(c).abs()));
                 (format!("{size}*{parameter}"), rational::integer(if sign { -1 } else { 1 }))
             }
         };
-        let told: Vec<(String, rational::Rational)> = terms.iter().map(told).collect();
-        sum_text(told.iter().map(|(name, sign)| (name, sign)))
+        let written: Vec<(String, rational::Rational)> = terms.iter().map(written).collect();
+        sum_text(written.iter().map(|(name, sign)| (name, sign)))
     }
 
     /// A text, cut where it is long.

@@ -96,7 +96,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
             "{file} is there already and was not generated: --force writes over it"
         )));
     }
-    // What is wrong with the arm file is told below.
+    // What is wrong with the arm file is reported below.
     let progress = super::arm(&args.arm).ok().map(|arm| Progress::new(&arm));
     config.warnings().map_err(failure)?.iter().for_each(|warning| eprintln!("warning: {warning}"));
     progress.iter().for_each(|p| p.say("deriving, proving and writing"));

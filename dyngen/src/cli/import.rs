@@ -20,7 +20,7 @@ pub(super) struct Args {
     /// The link that ends the chain; needed where the robot is a tree.
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
-    /// The arm file to write; the inertial values go beside it, as FILE.values.json.
+    /// The arm file to write; the inertial values go next to it, as FILE.values.json.
     #[arg(short, long, value_name = "FILE.toml")]
     output: PathBuf,
     /// Replace an arm file or values that are there already.

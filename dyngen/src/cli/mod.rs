@@ -38,7 +38,7 @@ enum Command {
     Describe(describe::Args),
     /// Writes the arm's functions as one Rust source file.
     Generate(generate::Args),
-    /// Makes an arm file, with inertial values beside it, from a serial chain of a URDF.
+    /// Makes an arm file, with inertial values next to it, from a serial chain of a URDF.
     Import(import::Args),
     /// Writes identified values into a copy of the file that an arm was imported from.
     Export(export::Args),
@@ -114,7 +114,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Man(args) => shell::man(&args),
     };
     match result {
-        // What was written is of no arm, as has been said.
+        // What was written is of no arm, as was reported.
         Ok(code) if code == ExitCode::SUCCESS && DOUBTFUL.load(Ordering::Relaxed) && !accept => {
             ExitCode::from(3)
         }
@@ -142,7 +142,7 @@ fn arm(path: &Path) -> Result<Arm, Failure> {
     Ok(arm)
 }
 
-/// Reads an arm and derives its model; what that costs is said where a person waits for it.
+/// Reads an arm and derives its model; what that costs is reported where a person waits for it.
 fn model(path: &Path) -> Result<Model, Failure> {
     let arm = arm(path)?;
     let progress = Progress::new(&arm);

@@ -49,11 +49,11 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         difference.line = line;
     }
     drop(progress);
-    let told = match args.json {
+    let output = match args.json {
         true => in_json(args, &report),
         false => in_words(args, &report),
     };
-    print(&told)?;
+    print(&output)?;
     Ok(if report.difference.is_none() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 

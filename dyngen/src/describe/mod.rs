@@ -19,7 +19,7 @@ use serde_json::{Map, Value, json};
 use std::num::NonZero;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// What is known of an arm beside its sets: what its functions cost and what its symmetries removed.
+/// What is known of an arm in addition to its sets: what its functions cost and what its symmetries removed.
 #[derive(Clone, Debug)]
 pub struct Description {
     /// What each function costs with the minimal set as arguments; last, as `prepare`, what all of them
@@ -42,7 +42,7 @@ impl Description {
         Description::with_progress(model, None, |_| {})
     }
 
-    /// The same, where somebody wants to know what is being done; with bounds of rounding for these `values` of the
+    /// As [`Self::of`], with progress reported; with bounds of rounding for these `values` of the
     /// minimal set, where there are any.
     ///
     /// # Errors

@@ -11,7 +11,7 @@ use crate::model::{Error, Model};
 use crate::parameters::SetKind;
 use std::f64::consts::PI;
 
-/// Singular values below this share of the largest are told. Real arms have 1e-3, residues 1e-5.
+/// Singular values below this share of the largest are reported. Real arms have 1e-3, residues 1e-5.
 const WEAK: f64 = 1e-4;
 /// Random states.
 const STATES: usize = 60;
@@ -52,8 +52,8 @@ pub(super) fn weak(model: &Model) -> Result<Vec<Weak>, Error> {
     evaluator.run(&samples, &mut rows);
     let mut columns: Vec<Vec<f64>> =
         (0..p).map(|c| rows.iter().skip(c).step_by(p).copied().collect()).collect();
-    // Masses, moments and inertias have units of their own; a column that is short beside others of its kind is
-    // what is looked for.
+    // Masses, moments and inertias have units of their own; a column that is short compared with others of
+    // its kind is what is looked for.
     let kinds: Vec<u8> =
         set.parameters.iter().map(|p| p.terms.first().map_or(0, |(p, _)| unit_of(p.kind))).collect();
     let norms: Vec<f64> = columns.iter().map(|column| dot(column, column).sqrt()).collect();

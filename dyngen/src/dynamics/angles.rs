@@ -56,7 +56,7 @@ struct Folded {
 }
 
 impl Angles {
-    /// Those of an arm.
+    /// The angles of an arm.
     pub fn new(arm: &Arm) -> Self {
         let joints = (0..arm.links()).map(|joint| JointAngle::new(arm, joint)).collect();
         let own: Vec<JointSum> = arm.coordinates().into_iter().map(JointSum::joint).collect();

@@ -32,7 +32,7 @@ pub struct FunctionGraph {
     pub graph: Graph,
     /// The result, row-major.
     pub outputs: Vec<Expr>,
-    /// Its rows and columns.
+    /// The result's rows and columns.
     pub shape: (usize, usize),
     /// Number of coordinates.
     pub joints: usize,
@@ -69,7 +69,7 @@ pub struct Subject<'a> {
     pub arm: &'a Arm,
     /// Of which angles functions take sine and cosine.
     pub angles: &'a Angles,
-    /// Its constant angles that are kept as symbols.
+    /// The arm's constant angles that are kept as symbols.
     pub symbols: &'a AngleSymbols,
     /// The field of its constants.
     pub field: &'a ConstantField,
@@ -315,7 +315,7 @@ impl<'a> Parts<'a> {
         self.drive(self.each(Input::Acceleration), true)
     }
 
-    /// The reference motion q̇ᵣ, q̈ᵣ of Slotine and Li beside q̇, under gravity.
+    /// The reference motion q̇ᵣ, q̈ᵣ of Slotine and Li in addition to q̇, under gravity.
     fn reference_motion(&self) -> motion::Drive {
         motion::Drive {
             velocities: self.velocities.clone(),

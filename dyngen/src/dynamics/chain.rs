@@ -108,7 +108,7 @@ fn slid(arm: &Arm, origins: Origins) -> Vec<bool> {
     slid
 }
 
-/// From a joint's axis to the next: the length of the common normal, and the offset beside it.
+/// From a joint's axis to the next: the length of the common normal, and the offset across it.
 fn lengths(arm: &Arm, joint: usize) -> [&crate::exact::rational::Rational; 2] {
     let row = match arm.convention {
         Convention::Standard => &arm.joints[joint],
@@ -153,12 +153,12 @@ pub fn geometry<A: Algebra>(
     let rest = |i: usize| if is_revolute(i) && !slid[i] { signed(i, &joint(i).shift) } else { zero.clone() };
     (0..n)
         .map(|i| {
-            let (normal, beside) = match arm.convention {
+            let (normal, across) = match arm.convention {
                 Convention::Standard => (joint(i).a.clone(), signed(i, &joint(i).b)),
                 Convention::Modified if i + 1 < n => (joint(i + 1).a.clone(), signed(i, &joint(i + 1).b)),
                 Convention::Modified => (zero.clone(), zero.clone()),
             };
-            let mut reach = [normal, beside, rest(i)];
+            let mut reach = [normal, across, rest(i)];
             if i + 1 < n && slid[i + 1] {
                 let (s, c) = twist(i + 1);
                 let d = signed(i + 1, &joint(i + 1).shift);
@@ -169,12 +169,12 @@ pub fn geometry<A: Algebra>(
                 Convention::Standard => ([joint(i).a.clone(), signed(i, &joint(i).b)], trig(joint(i))),
                 Convention::Modified => ([zero.clone(), zero.clone()], (zero.clone(), one.clone())),
             };
-            let [file_length, file_beside] = lengths;
+            let [file_length, file_across] = lengths;
             LinkGeometry {
                 reversed: reversed[i],
                 twist: twist(i),
                 reach,
-                file_origin: [file_length, file_beside, rest(i)],
+                file_origin: [file_length, file_across, rest(i)],
                 file_turn: turned(reversed[i], file_turn),
             }
         })

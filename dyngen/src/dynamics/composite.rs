@@ -12,7 +12,7 @@ use crate::graph::{Builder, Expr};
 /// A link of a stage, in the axes in which the recursion sees it.
 #[derive(Clone, Debug)]
 pub struct Piece {
-    /// Its body.
+    /// The piece's body.
     pub moments: Moments<Expr>,
     /// From its origin to the next link's.
     pub reach: Vector,

@@ -18,7 +18,7 @@ pub struct Followers<'a> {
 }
 
 impl<'a> Followers<'a> {
-    /// Those of an arm; where no joint follows another nothing changes.
+    /// The followers of an arm; where no joint follows another nothing changes.
     pub fn new(arm: &'a Arm, angles: &'a Angles) -> Self {
         Followers { arm, angles, drives: arm.drives() }
     }

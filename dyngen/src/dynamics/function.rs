@@ -16,7 +16,7 @@ pub enum Function {
     RegressorTransposeTimes,
     /// Y(q, q̇, q̇ᵣ, q̈ᵣ) of Slotine and Li, n × p
     SlotineLiRegressor,
-    /// Its transpose times e, p × 1
+    /// Yᵀ·e, the regressor of Slotine and Li transposed times e, p × 1
     SlotineLiTransposeTimes,
     /// B(q), n × n
     MassMatrix,
@@ -97,11 +97,11 @@ pub enum Function {
     TorqueHessianTimes,
     /// Centre of mass of the whole arm, 3 × 1
     CentreOfMass,
-    /// Its Jacobian, 3 × n
+    /// Jacobian of the centre of mass, 3 × n
     CentreOfMassJacobian,
     /// Linear above angular momentum about the base's origin, 6 × 1
     TotalMomentum,
-    /// Its matrix: momentum = matrix·q̇, 6 × n
+    /// Matrix of the total momentum: momentum = matrix·q̇, 6 × n
     TotalMomentumMatrix,
 }
 
@@ -112,7 +112,7 @@ pub enum Size {
     Joints,
     /// One for each parameter.
     Parameters,
-    /// The same for every arm.
+    /// A number that is the same for every arm.
     Fixed(usize),
 }
 
@@ -247,7 +247,8 @@ impl Function {
         all
     };
 
-    /// Those that a file has unless others are asked for: what identification and most controllers need.
+    /// The functions that a file has unless others are asked for: what identification and most controllers
+    /// need.
     pub fn common() -> impl Iterator<Item = Function> {
         Self::ALL.into_iter().take_while(|f| *f <= TorqueByVelocity)
     }

@@ -12,7 +12,7 @@ use crate::graph::{Builder, Expr};
 /// What a coordinate of a stage feels.
 #[derive(Clone, Copy, Debug)]
 pub struct Felt {
-    /// Its torque or force.
+    /// The coordinate's torque or force.
     pub torque: Expr,
     /// The wrench of its link about the link's origin, in the link's axes; of the last link of a stage with
     /// all beyond. Of a prismatic joint that before its turn.

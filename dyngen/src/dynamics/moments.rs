@@ -81,7 +81,7 @@ impl<V: Clone> Moments<V> {
         self.renamed(1).turned_back_x(alg, sin, cos).renamed(2)
     }
 
-    /// With the axes named further by so many places.
+    /// With the axes named further by `places` places.
     fn renamed(&self, places: usize) -> Self {
         let mut renamed = self.clone();
         for v in [&mut renamed.first, &mut renamed.square, &mut renamed.mixed] {

@@ -8,7 +8,7 @@ use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
 use crate::lagrangian::elements::turn_z;
 
-/// What drives the recursion beside the joints' positions.
+/// What drives the recursion in addition to the joints' positions.
 #[derive(Clone, Debug)]
 pub struct Drive {
     /// Velocities q̇.
@@ -24,7 +24,7 @@ pub struct Drive {
 /// How a link moves.
 #[derive(Clone, Copy, Debug)]
 pub struct LinkMotion {
-    /// Its frame's motion.
+    /// Motion of the link's frame.
     pub spin: Spin,
     /// Acceleration of its origin, less gravity, in its own axes.
     pub acceleration: Vector,
@@ -43,7 +43,7 @@ pub struct StageMotion {
     pub reference: Vec<Expr>,
     /// Accelerations of its coordinates.
     pub accelerations: Vec<Expr>,
-    /// Its links.
+    /// The stage's links.
     pub links: Vec<LinkMotion>,
     /// For each of its joints the velocity, reference velocity and acceleration of the motor about the
     /// stage's z, where that turns with several joints.

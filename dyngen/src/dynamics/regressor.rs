@@ -278,9 +278,9 @@ fn turned_moment(b: &Builder, trig: SinCos, across: bool, motion: &LinkMotion) -
     let spin = &motion.spin;
     let turn = |v: &Vector| crate::lagrangian::elements::turn_z(b, &trig.0, &trig.1, v);
     let own = Spin { omega: turn(&spin.omega), reference: turn(&spin.reference), ..*spin };
-    let [along, beside, _] = turn(&spin.rows[2]);
+    let [along, aside, _] = turn(&spin.rows[2]);
     let (height, about_z) =
-        if across { (along, own.product(b, 0, 1)) } else { (beside, -own.product(b, 0, 1)) };
+        if across { (along, own.product(b, 0, 1)) } else { (aside, -own.product(b, 0, 1)) };
     let lever = if across { [Expr::ZERO, -height, about_z] } else { [height, Expr::ZERO, about_z] };
     let turned = back_z(b, trig, &lever);
     let zz = [spin.product(b, 1, 2), -spin.product(b, 2, 0), Expr::ZERO];

@@ -274,9 +274,9 @@ fn stages_of_links(arm: &Arm) -> (Vec<usize>, Vec<Option<usize>>) {
 /// What is known exactly of how an arm's columns depend.
 #[derive(Clone, Copy, Debug)]
 pub struct Known<'a> {
-    /// Those of its own parameters.
+    /// Dependences of the arm's own parameters.
     pub minimal: &'a Dependence,
-    /// Those of the same chain with frames on its joints, where that needs fewer fractions.
+    /// Dependences of the same chain with frames on its joints, where that needs fewer fractions.
     pub on_joints: Option<&'a (Arm, Dependence)>,
 }
 
@@ -298,14 +298,14 @@ impl Regrouping {
         let coordinates_of = |sum: &Combination| match &on_joints {
             None => minimal_coordinates(field, known.minimal, sum),
             Some((chain, dependence)) => {
-                let told = |(p, factor): &(Parameter, Constant)| -> Combination {
+                let on_chain = |(p, factor): &(Parameter, Constant)| -> Combination {
                     if p.kind == ParameterKind::Im {
                         return vec![(*p, factor.clone())];
                     }
                     let there = chain.of_moments(p.link, &map.of_parameter(*p));
                     there.into_iter().map(|(q, c)| (q, field.mul(&c, factor))).collect()
                 };
-                let sum: Combination = sum.iter().flat_map(told).collect();
+                let sum: Combination = sum.iter().flat_map(on_chain).collect();
                 minimal_coordinates(field, dependence, &sum)
             }
         };

@@ -74,7 +74,7 @@ impl Spin {
         b.sub(&self.product(b, 0, 1), &self.rows[0][1])
     }
 
-    /// The same motion in axes that are turned about x.
+    /// This motion in axes that are turned about x.
     pub fn turned_x(&self, b: &Builder, (sin, cos): (Expr, Expr)) -> Spin {
         let turn = |v: &Vector| turn_x(b, &sin, &cos, v);
         Spin {

@@ -48,7 +48,7 @@ impl Form {
 /// A link in its stage.
 #[derive(Clone, Debug)]
 pub struct Member {
-    /// Its joint.
+    /// The link's joint.
     pub joint: usize,
     /// Whether z points against the joint's axis.
     pub reversed: bool,
@@ -71,7 +71,7 @@ pub struct Stage {
     pub kind: JointKind,
     /// The twist about x before it.
     pub twist: SinCos,
-    /// Its links.
+    /// The stage's links.
     pub members: Vec<Member>,
     /// Shift along z before its frame, of a prismatic joint.
     pub shift: Expr,

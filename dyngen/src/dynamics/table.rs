@@ -5,7 +5,7 @@ use super::function::Function::{self, *};
 use super::function::Kind;
 use super::function::Size::{self, Fixed, Joints, Parameters as ByParameter};
 
-/// What is known of a function beside its equations.
+/// What is known of a function in addition to its equations.
 pub(super) struct Row {
     pub(super) function: Function,
     /// On the command line and in the emitted code.

@@ -45,7 +45,7 @@ pub(super) fn trig_struct(model: &Model) -> TokenStream {
     }
 }
 
-/// Lines that say of which joints the angle is not q alone.
+/// Lines that name the joints whose angle is not q alone.
 pub(super) fn shifted_docs(model: &Model) -> Vec<String> {
     let joints = model.arm().coordinates().into_iter().enumerate();
     let offsets = joints.map(|(i, joint)| (i, model.angles().joint(joint).offset));

@@ -1,6 +1,6 @@
 //! Functions of a generated file for callers in C and C++: `extern "C"` functions over pointers, and their header.
 //!
-//! Nothing is computed here: each calls the function in Rust that stands beside it.
+//! Nothing is computed here: each calls the function in Rust next to it.
 
 use crate::dynamics::Function;
 use crate::dynamics::function::Argument;

@@ -1,5 +1,5 @@
-//! Columns for friction beside the regressor: each motor's own terms, functions of its velocity alone. A motor turns
-//! with its joint, but where a transmission says that it turns with several.
+//! Columns for friction in addition to the regressor: each motor's own terms, functions of its velocity
+//! alone. A motor turns with its joint, but where a transmission says that it turns with several.
 
 use super::docs;
 use crate::arm::Arm;

@@ -79,7 +79,7 @@ impl Options {
 
 /// A generated file as formatted source text: every function in it is proven equal to the Lagrangian.
 ///
-/// The same arm and options give the same bytes.
+/// Equal arm and options give the same bytes.
 ///
 /// # Errors
 /// As [`Model::function`]: what cannot be proven is not emitted; friction terms that do not fit the arm.
@@ -98,7 +98,7 @@ pub fn source(model: &Model, options: &Options) -> Result<String, Error> {
 struct Parts<'a> {
     set: &'a ParameterSet,
     functions: Vec<FunctionGraph>,
-    /// Those at each frame.
+    /// The functions at each frame.
     frames: Vec<(String, Vec<FunctionGraph>)>,
     /// What all of them need of the parameters alone.
     preparation: Preparation,
@@ -217,8 +217,8 @@ fn built(
         .collect()
 }
 
-/// Those of the wished functions that are the tool's, for each frame of the arm; a frame that cannot accelerate in every
-/// direction has fewer.
+/// The wished functions that are the tool's, for each frame of the arm; a frame that cannot accelerate in
+/// every direction has fewer.
 fn frames(
     model: &Model,
     options: &Options,

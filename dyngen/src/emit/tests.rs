@@ -1,4 +1,4 @@
-//! The arm's own consistency tests, emitted beside its functions: identities that hold between them, in
+//! The arm's own consistency tests, emitted next to its functions: identities that hold between them, in
 //! floating point.
 
 use super::Options;

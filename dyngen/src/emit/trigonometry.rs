@@ -127,7 +127,7 @@ const COSINE: [f64; 6] = [
     -1.13596475577881948265e-11,
 ];
 
-/// The same in single precision, interpolated at Chebyshev points.
+/// Coefficients of the sine in single precision, interpolated at Chebyshev points.
 const SINE_SINGLE: [f64; 4] =
     [-0.1666666716337204, 0.008333331905305386, -0.00019840082677546889, 2.7249313916399842e-06];
 const COSINE_SINGLE: [f64; 3] = [0.0416666641831398, -0.0013888300163671374, 2.4547436623834074e-05];

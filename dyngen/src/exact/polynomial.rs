@@ -25,7 +25,7 @@ impl Monomial {
         (self.0[variable / 8] >> (8 * (variable % 8))) as u8
     }
 
-    /// The same monomial with another exponent of one variable.
+    /// This monomial with another exponent of one variable.
     pub fn with(mut self, variable: usize, exponent: u8) -> Self {
         let (word, shift) = (variable / 8, 8 * (variable % 8));
         self.0[word] = (self.0[word] & !(0xff << shift)) | (u64::from(exponent) << shift);
@@ -109,7 +109,7 @@ where
         PolynomialRing { squares }
     }
 
-    /// The same ring with more variables after its own.
+    /// This ring with more variables after its own.
     ///
     /// # Panics
     /// As [`PolynomialRing::new`].

@@ -56,7 +56,7 @@ pub struct AngleSymbols {
 }
 
 impl AngleSymbols {
-    /// Those among some angles.
+    /// The symbols among some angles.
     pub fn collect<'a>(angles: impl IntoIterator<Item = &'a Angle>) -> Self {
         let mut symbols = AngleSymbols::default();
         for angle in angles {

@@ -39,7 +39,7 @@ pub(super) struct Spring {
 /// A passive `<dcmotor>`.
 #[derive(Debug)]
 pub(super) struct Motor {
-    /// Its attributes beside those that make it passive.
+    /// The motor's attributes in addition to those that make it passive.
     pub(super) attributes: String,
     /// What it is, and how exactly.
     pub(super) words: String,
@@ -70,7 +70,7 @@ pub(super) fn motors(kind: JointKind, friction: Option<Friction>, terms: &[&Term
                 attributes: lugre(c / distance, c, c, 1.0),
                 words: format!(
                     "{effect}: Dahl's presliding friction of {} within {}, exactly",
-                    told(&[term]),
+                    with_error(&[term]),
                     shortest(*distance)
                 ),
                 has_state: true,
@@ -90,7 +90,7 @@ pub(super) fn motors(kind: JointKind, friction: Option<Friction>, terms: &[&Term
                             "{effect}: in place of frictionloss, {} + {} exp(-(v/{})^2) in steady sliding; not from \
                              a log: that bristles of {} hold it at rest",
                             shortest(coulomb),
-                            told(&[term]),
+                            with_error(&[term]),
                             shortest(*velocity),
                             shortest(bristles)
                         ),
@@ -125,14 +125,14 @@ fn spring(terms: &[&Term]) -> Option<Spring> {
         words: format!(
             "{}: the motor has to bring up {} q + {}, exactly",
             grows[0].effect,
-            told(&grows),
-            told(&constant)
+            with_error(&grows),
+            with_error(&constant)
         ),
     })
 }
 
 /// The sum of some terms' coefficients with its standard error, which takes those of the terms for independent.
-fn told(terms: &[&Term]) -> String {
+fn with_error(terms: &[&Term]) -> String {
     let value = shortest(terms.iter().map(|term| term.coefficient).sum());
     let square: Option<f64> = terms.iter().map(|term| term.std.map(|std| std * std)).sum();
     match square {
@@ -165,8 +165,8 @@ fn cogging(effect: &str, order: f64, terms: &[&Term]) -> Motor {
         attributes: format!("gear=\"{gear}\" cogging=\"{amplitude} {poles} {phase}\""),
         words: format!(
             "{effect}: the motor has to bring up {} cos({order} q) + {} sin({order} q), exactly",
-            told(&cosines),
-            told(&sines)
+            with_error(&cosines),
+            with_error(&sines)
         ),
         has_state: false,
     }

@@ -42,7 +42,7 @@ impl Known {
     /// What the files lack: each link needs all its parameters, and they must be those of a body.
     pub fn read(arm: &Arm, values: (&str, &str), friction: Option<(&str, &str)>) -> Result<Known, String> {
         let (text, file) = values;
-        // Text that is no JSON, and keys that stand twice, are told as for any values file.
+        // Text that is no JSON, and keys that stand twice, are reported as for any values file.
         let json: Value = serde_json::from_str(text).map_err(|e| format!("{file}: not valid JSON: {e}"))?;
         let consistent = json.get("consistent").and_then(|c| c.get("parameters")).map(Value::to_string);
         let given = Values::parse(consistent.as_deref().unwrap_or(text), file).map_err(|e| e.to_string())?;
@@ -94,7 +94,7 @@ impl Known {
 
 impl Known {
     /// Without the damping of joints that is not larger than its own standard error, which then stays as it is in the
-    /// robot description; and what is to be said of that.
+    /// robot description; and what is to be reported about that.
     pub fn without_uncertain_damping(&mut self, arm: &Arm) -> Vec<String> {
         let mut said = Vec::new();
         let names = arm.joints.iter().enumerate();
@@ -153,8 +153,8 @@ fn read_friction(arm: &Arm, json: &Value) -> Result<Vec<Option<Friction>>, Strin
             return Err(format!("the friction of joint {} is negative", joint + 1));
         }
         let std = |k: usize| entry.and_then(|e| e["std"][k].as_f64());
-        let told = entry.and_then(|e| e["coulomb_std"].as_f64());
-        let coulomb_std = told.or_else(|| std(0).map(|s| s + std(2).unwrap_or(0.0)));
+        let given = entry.and_then(|e| e["coulomb_std"].as_f64());
+        let coulomb_std = given.or_else(|| std(0).map(|s| s + std(2).unwrap_or(0.0)));
         Ok(Friction { viscous: Some(viscous), coulomb: first + second, std: [std(4), coulomb_std] })
     };
     let coordinates = arm.coordinates();

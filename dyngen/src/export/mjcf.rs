@@ -76,7 +76,7 @@ pub fn mjcf(
     Ok(Exported { text: writer.edits.apply(text), notes })
 }
 
-/// What is known of a joint: what it, or its motor's tendon, holds, and the effects beside that.
+/// What is known of a joint: what it, or its motor's tendon, holds, and the effects in addition to that.
 fn held(arm: &Arm, known: &Known, i: usize) -> (Held, Motors) {
     let rotor = known.values[11 * i + 10];
     let armature = arm.joints[i].rotor_ratio.as_ref().map(|k| to_f64(k).powi(2) * rotor);
@@ -89,7 +89,7 @@ fn held(arm: &Arm, known: &Known, i: usize) -> (Held, Motors) {
     (Held { friction, armature, spring: effects.spring.take() }, effects)
 }
 
-/// What a joint holds beside its range, or the tendon of a motor that turns with several joints.
+/// What a joint holds in addition to its range, or the tendon of a motor that turns with several joints.
 struct Held {
     friction: Option<Friction>,
     armature: Option<f64>,

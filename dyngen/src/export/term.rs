@@ -3,7 +3,8 @@
 use crate::arm::Arm;
 use serde_json::Value;
 
-/// A torque that the motor of a joint has to bring up besides, N·m or N: a coefficient times a law of the joint's motion.
+/// An additional torque that the motor of a joint has to bring up, N·m or N: a coefficient times a law of the
+/// joint's motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Term {
     /// The link behind the joint, from 0.
@@ -12,7 +13,7 @@ pub struct Term {
     pub effect: String,
     /// N·m or N.
     pub coefficient: f64,
-    /// Its standard error, where it is known.
+    /// Standard error of the coefficient, where it is known.
     pub std: Option<f64>,
     /// What it is multiplied with.
     pub law: Law,

@@ -16,7 +16,7 @@ use std::fmt::Write;
 pub struct Exported {
     /// The whole file.
     pub text: String,
-    /// What is to be said of it.
+    /// What is to be reported about it.
     pub notes: Vec<String>,
 }
 

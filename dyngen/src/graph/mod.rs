@@ -42,7 +42,7 @@ impl Expr {
         self.0 & 1 == 1
     }
 
-    /// The same node without the sign.
+    /// This node without the sign.
     pub fn positive(self) -> Expr {
         Expr(self.0 & !1)
     }
@@ -202,7 +202,7 @@ impl Graph {
         self.count(outputs, |_| true)
     }
 
-    /// The operations that some outputs cost beside those that depend on parameters alone and can be
+    /// The operations that some outputs cost in addition to those that depend on parameters alone and can be
     /// prepared.
     pub fn operations_when_prepared(&self, outputs: &[Expr]) -> Operations {
         let holds = self.holds();

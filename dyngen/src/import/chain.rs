@@ -38,7 +38,7 @@ pub(crate) struct ChainJoint {
     pub(crate) torque: Option<f64>,
     /// The joint of the chain that it follows, by its index there, with ratio and offset.
     pub(crate) follows: Option<(usize, Mimic)>,
-    /// What the file says of its drive.
+    /// What the file states about its drive.
     pub(crate) motor: Option<Motor>,
     /// The links that move as one behind the joint.
     pub(crate) links: Vec<String>,
@@ -46,7 +46,7 @@ pub(crate) struct ChainJoint {
     pub(crate) poses: Vec<Pose>,
     /// Frames that have names of their own on the body: of links that are fixed to its first one, and sites.
     pub(crate) frames: Vec<(String, Pose)>,
-    /// Those of them that have mass.
+    /// Links of the body that have mass.
     pub(crate) masses: Vec<Mass>,
 }
 
@@ -133,7 +133,7 @@ fn find_leaders(joints: &mut [ChainJoint], robot: &Robot) {
     }
 }
 
-/// What to say of joints behind which no link has mass.
+/// What to report about joints behind which no link has mass.
 fn without_mass(joints: &[ChainJoint]) -> Option<String> {
     let massless = joints.iter().filter(|joint| joint.masses.is_empty());
     let massless: Vec<String> = massless.map(|joint| format!("'{}'", joint.name)).collect();

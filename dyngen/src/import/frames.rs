@@ -40,7 +40,7 @@ pub(super) struct Frames {
     pub(super) rows: Vec<Row>,
 }
 
-/// The way from one axis to the next: along their common normal, or beside it where that is far away.
+/// The way from one axis to the next: along their common normal, or off it where that is far away.
 #[derive(Clone, Copy)]
 struct Normal {
     /// Of the common normal.
@@ -48,7 +48,7 @@ struct Normal {
     /// Where the way leaves the nearer axis and meets the farther one.
     foot: Vector3<f64>,
     head: Vector3<f64>,
-    /// Its part along the normal, and the one across normal and nearer axis.
+    /// Part of the way along the normal, and the one across normal and nearer axis.
     a: f64,
     b: f64,
     alpha: f64,

@@ -1,8 +1,8 @@
 //! A MuJoCo model's bodies and joints as the links and joints of a robot.
 //!
 //! A body is a link; a body with several joints gets a link without mass between each two. Where a joint does
-//! not sit at the body's origin, a fixed joint leads back from it. What MuJoCo says of `compiler`, `default`
-//! classes and orientations: mujoco.readthedocs.io, XMLreference and modeling.
+//! not sit at the body's origin, a fixed joint leads back from it. MuJoCo's documentation of `compiler`,
+//! `default` classes and orientations: mujoco.readthedocs.io, XMLreference and modeling.
 
 use super::equality::{self, Equality};
 use super::numbers::finite;
@@ -56,7 +56,7 @@ pub(crate) fn angles_are_radians(document: &Document<'_>) -> bool {
     compilers.filter_map(|n| n.attribute("angle")).last() == Some("radian")
 }
 
-/// What `<compiler>` says of numbers.
+/// What `<compiler>` states about numbers.
 struct Compiler {
     angles: Angles,
     /// Whether a joint with a range is limited without saying so; it is unless this is set.
@@ -172,7 +172,8 @@ impl<'d, 'i> Reader<'d, 'i> {
         }
     }
 
-    /// A joint that follows another one by a straight line is one that mimics it; other equalities are told.
+    /// A joint that follows another one by a straight line is one that mimics it; other equalities are
+    /// reported.
     fn equality(&mut self, node: Node<'d, 'i>) {
         let (line, kind) = (self.line(node), node.tag_name().name());
         let reference = |joint: &str| self.references.get(joint).copied().unwrap_or(0.0);

@@ -1,4 +1,5 @@
-//! Arms from other descriptions: a serial chain of a URDF becomes an arm file with inertial values beside it.
+//! Arms from other descriptions: a serial chain of a URDF becomes an arm file with inertial values next to
+//! it.
 //!
 //! 0. `source`: the file's letters and what it includes; `urdf`, `mjcf`: its links and joints.
 //! 1. `tree`, `chain`: from the tree of links to one chain: fixed joints merged, everything at q = 0 in the root

@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 
 /// What is smaller is residue of a calculation: m, rad, or a share of an axis.
 const RESIDUE: f64 = 1e-6;
-/// What is smaller is said nowhere: double precision makes it.
+/// What is smaller is not reported: double precision makes it.
 const SILENT: f64 = 1e-12;
 /// Decimals with which a multiple of pi/2, of pi/6 or pi/4, and of pi/12 is recognised.
 const DECIMALS: [i32; 3] = [2, 3, 4];

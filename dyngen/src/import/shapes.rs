@@ -81,7 +81,7 @@ impl Solid {
         Ok(Some(Solid { mass, moments: per_mass * mass, pose }))
     }
 
-    /// The same, where what it lies in lies at a pose.
+    /// This solid, where what it lies in lies at a pose.
     pub(super) fn seen_from(self, pose: &Pose) -> Solid {
         Solid { pose: pose.then(&self.pose), ..self }
     }

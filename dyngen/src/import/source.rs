@@ -209,8 +209,8 @@ impl Whole {
     fn include(&mut self, node: Node<'_, '_>, folder: &Path) -> Result<(), String> {
         let name = node.attribute("file").ok_or("<include> names no file")?;
         let this = format!("<include file=\"{name}\">");
-        let beside = self.folder.join(name);
-        let path = if beside.exists() { beside } else { folder.join(name) };
+        let here = self.folder.join(name);
+        let path = if here.exists() { here } else { folder.join(name) };
         let unreadable = |e: std::io::Error| {
             format!("{this} cannot be read: {e}: its place is relative to the model's folder")
         };

@@ -63,7 +63,7 @@ fn module_name(given: &str, taken: &[String]) -> String {
     (1..).map(again).find(|name| !taken.contains(name)).unwrap_or(name.clone())
 }
 
-/// Where the arm comes from, what the import says of it, and what holds for all joints.
+/// Where the arm comes from, what the import reports about it, and what holds for all joints.
 fn heading(text: &mut String, chain: &Chain, frames: &Frames, file: &str, convention: Convention) {
     let mut comment = |line: String| {
         // A String takes every write.
@@ -94,13 +94,13 @@ fn table_of_joint(text: &mut String, joint: &ChainJoint, row: &Row, tolerance: f
         JointKind::Revolute => "revolute",
         JointKind::Prismatic => "prismatic",
     };
-    let beside = match length(row.b).as_str() {
+    let offset = match length(row.b).as_str() {
         "0" => String::new(),
         b => format!("b = {b}\n"),
     };
     let _ = write!(
         text,
-        "\n# links {}\n[[joint]]\nname = \"{}\"\nkind = \"{kind}\"\na = {}\n{beside}alpha = {}\nd = \
+        "\n# links {}\n[[joint]]\nname = \"{}\"\nkind = \"{kind}\"\na = {}\n{offset}alpha = {}\nd = \
          {}\ntheta = {}\n",
         plain(&joint.links.iter().map(|l| format!("'{l}'")).collect::<Vec<_>>().join(", ")),
         quoted(&joint.name),
@@ -116,7 +116,7 @@ fn table_of_joint(text: &mut String, joint: &ChainJoint, row: &Row, tolerance: f
     }
 }
 
-/// The ratio of a joint's gear, and what the file says of its friction.
+/// The ratio of a joint's gear, and what the file states about its friction.
 fn drive(text: &mut String, joint: &ChainJoint) {
     let Some(motor) = joint.motor else { return };
     if let Some(ratio) = ratio(joint) {

@@ -52,7 +52,7 @@ pub(crate) struct Joint {
     pub(crate) velocity: f64,
     /// The joint that it follows.
     pub(crate) mimic: Option<Mimic>,
-    /// What a MuJoCo model says of its drive.
+    /// What a MuJoCo model states about its drive.
     pub(crate) motor: Option<Motor>,
     /// What may surprise, where it is a joint of the chain.
     pub(crate) note: Option<String>,

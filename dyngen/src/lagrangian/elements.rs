@@ -32,7 +32,7 @@ pub struct JointElements<V> {
     pub kind: JointKind,
     /// Sine of the angle about z: q + theta, or theta of a prismatic joint.
     pub sin: V,
-    /// Its cosine.
+    /// Cosine of that angle.
     pub cos: V,
     /// Shift along z: d, or d + q of a prismatic joint.
     pub shift: V,
@@ -42,7 +42,7 @@ pub struct JointElements<V> {
     pub motor_velocity: V,
     /// Link length a.
     pub a: V,
-    /// Offset b beside it, along y.
+    /// Offset b in addition to it, along y.
     pub b: V,
     /// Sine of the twist.
     pub sin_alpha: V,
@@ -66,7 +66,7 @@ pub struct ArmElements<V> {
 /// The place of a frame in another: the tool's in the last link's, frame 0's in the root link's.
 #[derive(Clone, Debug)]
 pub struct PlacementElements<V> {
-    /// Its origin.
+    /// Origin of the placement.
     pub origin: [V; 3],
     /// Sine and cosine of roll, pitch and yaw.
     pub rpy: [(V, V); 3],
@@ -127,7 +127,7 @@ pub trait Source<V> {
     fn velocity(&mut self, joint: usize) -> V;
     /// Link length; asked for only where it is not zero.
     fn a(&mut self, joint: usize) -> V;
-    /// Offset along y beside it; asked for only where it is not zero.
+    /// Offset along y in addition to it; asked for only where it is not zero.
     fn b(&mut self, joint: usize) -> V;
     /// Link offset; asked for only where it is not zero.
     fn d(&mut self, joint: usize) -> V;

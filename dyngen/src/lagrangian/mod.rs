@@ -30,7 +30,7 @@ pub fn twice_lagrangian<A: Algebra>(alg: &A, arm: &ArmElements<A::Value>) -> Vec
     twice_lagrangian_on(alg, arm, Motion::base(alg, arm))
 }
 
-/// The same where frame 0 moves.
+/// As [`twice_lagrangian`], where frame 0 moves.
 pub fn twice_lagrangian_on<A: Algebra>(
     alg: &A,
     arm: &ArmElements<A::Value>,

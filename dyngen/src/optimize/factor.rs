@@ -77,8 +77,8 @@ fn sum(b: &Builder, mut terms: Vec<Term>) -> Expr {
 }
 
 /// The factor of most products with the terms that share it, where two do; of equals the first. What would be
-/// left of them depends on the state but for one: sums of parameters would have to be prepared beside what
-/// is.
+/// left of them depends on the state but for one: sums of parameters would have to be prepared in addition to
+/// what is.
 fn most_shared(terms: &[Term]) -> Option<(Factor, Vec<usize>)> {
     let mut sharing: BTreeMap<Expr, (bool, Vec<usize>, bool)> = BTreeMap::new();
     for (k, term) in terms.iter().enumerate().filter(|(_, term)| term.factors.len() > 1) {

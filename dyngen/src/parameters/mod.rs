@@ -67,7 +67,7 @@ pub struct SetParameter {
 pub struct ParameterSet {
     /// Which one.
     pub kind: SetKind,
-    /// Its parameters, in order.
+    /// The set's parameters, in order.
     pub parameters: Vec<SetParameter>,
     /// The rank of its columns for the numbers in the file.
     pub rank: usize,

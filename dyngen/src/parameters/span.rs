@@ -1,4 +1,5 @@
-//! Sums of parameters as combinations of other sums: what one base set says of another one of the same arm.
+//! Sums of parameters as combinations of other sums: what one base set determines of another one of the same
+//! arm.
 
 use crate::arm::Parameter;
 

@@ -253,7 +253,7 @@ fn times(a: &[Fp], b: &[Fp], inner: usize) -> Vec<Fp> {
     (0..a.len() / inner * columns).map(entry).collect()
 }
 
-/// The transpose of a row-major matrix with so many columns.
+/// The transpose of a row-major matrix with `columns` columns.
 fn transposed(matrix: &[Fp], columns: usize) -> Vec<Fp> {
     (0..columns).flat_map(|j| matrix.iter().skip(j).step_by(columns).copied()).collect()
 }

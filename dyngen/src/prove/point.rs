@@ -95,7 +95,7 @@ impl<'a> Point<'a> {
         }
     }
 
-    /// The same values at the pose where every coordinate's input angle is zero.
+    /// This point's values at the pose where every coordinate's input angle is zero.
     pub(crate) fn at_zero(&self) -> Point<'a> {
         Point {
             angles: angles(self.arm, &mut || (Fp::ZERO, Fp::ONE)),
@@ -109,7 +109,7 @@ impl<'a> Point<'a> {
         Point { loaded: function.takes(Argument::Payload), ..self.clone() }
     }
 
-    /// The same with the payload on the tool's frame.
+    /// This point with the payload on the tool's frame.
     pub(super) fn with_payload(&self) -> Point<'a> {
         Point { loaded: true, ..self.clone() }
     }

@@ -108,7 +108,7 @@ pub(super) fn in_tool_axes(pose: &[Fp], jacobian: &[Fp], n: usize) -> Vec<Fp> {
     (0..6 * n).map(|k| entry(k / n, k % n)).collect()
 }
 
-/// The same about the base's origin: v + p×ω above ω.
+/// A Jacobian in base axes, about the base's origin: v + p×ω above ω.
 pub(super) fn about_base(pose: &[Fp], jacobian: &[Fp], n: usize) -> Vec<Fp> {
     let (origin, angular) =
         (|i: usize| pose[i % 3 * 4 + 3], |i: usize, j: usize| jacobian[(3 + i % 3) * n + j]);

@@ -65,7 +65,7 @@ impl<'p, 'a> State<'p, 'a> {
         columns
     }
 
-    /// The same at the state itself.
+    /// The Lagrangian's columns at the state itself.
     fn here(&self) -> Vec<Jet<Fp>> {
         self.lagrangian(PrimeField, vec![Fp::ZERO; self.dof()], self.velocities.to_vec())
     }

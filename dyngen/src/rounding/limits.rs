@@ -19,7 +19,7 @@ impl<'a> Limits<'a> {
         Limits { arm, coordinates: arm.coordinates(), parameters }
     }
 
-    /// What the file, or the values, say of a number; `None` where the file has no such limit.
+    /// What the file, or the values, state about a number; `None` where the file has no such limit.
     pub(super) fn range(&self, (argument, i): Variable) -> Option<Interval> {
         let joint = self.coordinates.get(i).and_then(|joint| self.arm.joints.get(*joint));
         match argument {

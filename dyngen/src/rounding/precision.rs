@@ -49,7 +49,7 @@ impl Precision {
         self.of_double(written, of_text)
     }
 
-    /// The same of a double that is known within `error`.
+    /// As [`Self::of_constant`], for a double that is known within `error`.
     pub(super) fn of_double(self, written: f64, error: f64) -> f64 {
         let converted = (self.round(written) - written).abs();
         if converted + error == 0.0 { 0.0 } else { (converted + error) * (1.0 + 4.0 * f64::EPSILON) }

@@ -52,7 +52,7 @@ mod tests {
     use super::keys;
 
     #[test]
-    fn a_key_that_stands_twice_is_told_with_its_place() {
+    fn a_key_that_stands_twice_is_reported_with_its_place() {
         assert_eq!(keys(r#"{"a": 1, "b": ["a", "a"], "c": {"a": "b"}, "d\\\"": "\"a\": }{"}"#), []);
         let found = keys("{\"m1\": 1,\n  \"m2\": {\"x\": [1], \"x\" : 2},\n \"m1\" : 2}");
         let places: Vec<(usize, usize)> = found.iter().map(|(line, column, _)| (*line, *column)).collect();

@@ -272,8 +272,8 @@ impl Verifier {
     }
 }
 
-/// What a file says of where a matrix is not zero, against the entries at a point: one that is zero at random is always
-/// zero.
+/// What a file states about where a matrix is not zero, against the entries at a point: one that is zero at
+/// random is always zero.
 fn structure(
     source: &Source,
     name: &str,

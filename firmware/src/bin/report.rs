@@ -68,7 +68,7 @@ macro_rules! bits {
 }
 
 /// Cycles of a controller along a motion. From the middle on joint 2 needs 3 N·m more than its model says: in which
-/// cycle the test says so first stands beside the bits.
+/// cycle the test reports so first is printed next to the bits.
 fn bits_of_cycles(out: &mut impl Write) {
     let values = single::prepared(&single::PARAMETERS.into());
     let mut controller = Controller::default();

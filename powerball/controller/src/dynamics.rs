@@ -1,4 +1,4 @@
-//! The rigid dynamics that control laws ask of an arm: what generated code gives.
+//! The rigid dynamics that control laws require of an arm: what generated code gives.
 
 use nalgebra::{Matrix4, RealField, SMatrix, SVector, Vector6};
 

@@ -14,13 +14,13 @@ impl JointNumber {
         JointNumber(index)
     }
 
-    /// Its place in a slice, from 0.
+    /// The joint's place in a slice, from 0.
     #[must_use]
     pub const fn index(self) -> usize {
         self.0
     }
 
-    /// Its number, from 1.
+    /// The joint's number, from 1.
     #[must_use]
     pub const fn number(self) -> usize {
         self.0 + 1

@@ -1,4 +1,4 @@
-//! What an explanation is told beside the logs, and why there may be none.
+//! What an explanation is given in addition to the logs, and why there may be none.
 
 use super::rule::Rule;
 use super::torque_model::{FileError, TorqueModel, Unchanged};
@@ -6,7 +6,8 @@ use powerball_controller::JointNumber;
 use powerball_logs::Progress;
 use powerball_logs::regression::{DataError, DataOptions};
 
-/// What an explanation is told beside the arm and the logs. The default knows nothing and tells nobody.
+/// What an explanation is given in addition to the arm and the logs. The default knows nothing and reports to
+/// nobody.
 #[derive(Clone, Debug, Default)]
 pub struct ExplainOptions<'a> {
     /// The thresholds of the rule.

@@ -96,7 +96,7 @@ pub fn simulate(
     })
 }
 
-/// The same with a controller of the caller's: it gives n torques, N·m.
+/// As [`simulate`], with a controller of the caller's: it gives n torques, N·m.
 ///
 /// # Errors
 /// As [`simulate`], and what the controller raises.

@@ -40,7 +40,8 @@ impl<const N: usize> NumericArm<N> {
         }))
     }
 
-    /// The same arm with the bodies of another one, which has the same joints: dynamics are linear in the parameters.
+    /// This arm with the bodies of another one, which has the same joints: dynamics are linear in the
+    /// parameters.
     #[must_use]
     pub fn holding(self, held: NumericArm<N>) -> Self {
         NumericArm { held: Some(Box::new(held)), ..self }

@@ -47,13 +47,13 @@ impl<'a> Source<'a> {
         Source::from(path.into())
     }
 
-    /// The same, recorded with the base mounted so.
+    /// This source, recorded with the base mounted so.
     #[must_use]
     pub fn mounted(self, mounting: Mounting) -> Source<'a> {
         Source { mounting: Some(mounting), ..self }
     }
 
-    /// The same, its columns read so.
+    /// This source, its columns read so.
     #[must_use]
     pub fn mapped(self, map: Arc<ColumnMap>) -> Source<'a> {
         Source { map, ..self }
@@ -169,7 +169,7 @@ pub struct Summarized {
     pub bands: Bands,
     /// Why its logs should not be used, each a sentence without its full stop.
     pub unusable: Vec<String>,
-    /// What is to be said of the logs and the arm file.
+    /// What is to be reported about the logs and the arm file.
     pub warnings: Vec<String>,
 }
 

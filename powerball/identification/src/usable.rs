@@ -7,7 +7,7 @@ use dyngen::Arm;
 use powerball_controller::JointNumber;
 use powerball_logs::log::Log;
 
-/// What is asked of a result.
+/// What a result must satisfy.
 #[derive(Clone, Debug, Default)]
 pub struct Findings<'a> {
     /// What the columns are.
@@ -33,7 +33,7 @@ impl Findings<'_> {
     pub fn reasons(&self) -> Vec<String> {
         let mut reasons: Vec<String> = Vec::new();
         if self.columns.is_some_and(Conventions::differ) {
-            reasons.push("the columns or the arm file are not what they are said to be".to_string());
+            reasons.push("the columns or the arm file are not what they are declared to be".to_string());
         }
         reasons.extend(self.doubts.iter().cloned());
         if self.not_finite {

@@ -17,13 +17,13 @@ pub struct VerifyOptions<'a> {
     /// Largest error of a joint, as a share of the rms of its torque.
     pub tolerance: f64,
     /// The end of each joint's band, Hz, in which its error is taken: [`Identified::joint_bands`] of the
-    /// model. The widest where nothing, or none of [`BANDS`], is said.
+    /// model. The widest where nothing, or none of [`BANDS`], is given.
     ///
     /// [`Identified::joint_bands`]: super::Identified::joint_bands
     pub joint_bands: Vec<f64>,
     /// How logs are filtered and cut into blocks.
     pub data: DataOptions,
-    /// Who is told what is being done.
+    /// Where progress is reported.
     pub progress: Progress<'a>,
 }
 
@@ -43,7 +43,7 @@ impl Default for VerifyOptions<'_> {
 pub struct Verified {
     /// The arm's name.
     pub arm: String,
-    /// Its error with an interval, joint by joint.
+    /// The model's error with an interval, joint by joint.
     pub joints: Vec<JointVerdict>,
     /// As it was asked for.
     pub tolerance: f64,
@@ -56,7 +56,7 @@ pub struct Verified {
     /// Why it should not be used, each a sentence without its full stop; empty where it may be.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unusable: Vec<String>,
-    /// What is to be said of the logs and the arm file.
+    /// What is to be reported about the logs and the arm file.
     pub warnings: Vec<String>,
     /// Measured torque and error, by joint.
     #[serde(skip)]

@@ -51,7 +51,7 @@ impl Motion {
         }
     }
 
-    /// The same samples at `pace` of the velocities, 0 to 1: they take so much longer.
+    /// This motion's samples at `pace` of the velocities, 0 to 1: they take 1/`pace` times as long.
     #[must_use]
     pub fn slower(&self, pace: f64) -> Motion {
         let mut slow = self.clone();

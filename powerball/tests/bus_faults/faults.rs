@@ -45,7 +45,7 @@ pub(crate) enum Fault {
 }
 
 impl Fault {
-    /// Those that every mode answers in the same way, but for how soon.
+    /// Faults that every mode answers in the same way, but for how soon.
     pub(crate) const ALL: [(Fault, &'static str); 29] = [
         (Fault::DropOne, "one frame dropped"),
         (Fault::DropFive, "5 cycles of frames dropped"),
@@ -147,8 +147,8 @@ impl Fault {
         world.bus.peer_mut().arm.fault(VICTIM, slave::Fault::Statusword(None));
     }
 
-    /// Whether `cause` tells of this fault.
-    pub(crate) fn is_told_by(self, cause: &Cause) -> bool {
+    /// Whether `cause` reports this fault.
+    pub(crate) fn is_reported_by(self, cause: &Cause) -> bool {
         let victim = cause.node().is_none_or(|node| node == VICTIM);
         victim
             && match self {
@@ -216,8 +216,8 @@ impl Fault {
             // An answer of the commutation search may be on the wire when the stop leaves.
             Fault::DropFive | Fault::ShortFive => stop(if phase == Commutating { 5 } else { 4 }),
             Fault::Reboot if phase == Boot => GoesOn,
-            // The node is silent while it boots: missed within three cycles, and told as what it is when it
-            // has booted.
+            // The node is silent while it boots: missed within three cycles, and reported as what it is when
+            // it has booted.
             Fault::Reboot | Fault::Silent => stop(4),
             // Nodes may complain while they boot: what counts is their state later.
             Fault::EmcyStorm if early => GoesOn,
@@ -255,7 +255,7 @@ impl Fault {
                 Stopping | Resetting => GoesOn,
                 _ => stop(3),
             },
-            // Asked of in histories alone.
+            // Used in histories alone.
             Fault::Frozen | Fault::Drift | Fault::TorqueFull => stop(0),
             Fault::QueueFull | Fault::LateOnce | Fault::LateLong => match phase {
                 Faulted => Stays,
@@ -360,9 +360,9 @@ impl Stage {
 /// What must follow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Expected {
-    /// It does no harm: the arm comes to run, runs on, or comes to rest as told.
+    /// It does no harm: the arm comes to run, runs on, or comes to rest as commanded.
     GoesOn,
-    /// Quick stop reaches every drive within so many cycles, the cause is latched.
+    /// Quick stop reaches every drive within this many cycles, the cause is latched.
     Stops { cycles: u64 },
     /// Nothing moves yet, or any more: the cause is latched and nothing may be enabled.
     Refused,

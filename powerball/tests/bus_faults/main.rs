@@ -81,7 +81,7 @@ fn cell(fault: Fault, stage: Stage, control: ControlMode) -> Result<String, Stri
                 return fail(format!("stopped after {took} cycles, {cycles} are allowed"));
             }
             if let Some((at, node, word)) = world.motion_after_stop(injected, last) {
-                return fail(format!("node {node} is told to move ({word:?}) after its stop, at {at}"));
+                return fail(format!("node {node} is commanded to move ({word:?}) after its stop, at {at}"));
             }
             after_stop(&mut world, fault, last)?;
             latched(&mut world, fault)?;
@@ -113,7 +113,7 @@ fn cell(fault: Fault, stage: Stage, control: ControlMode) -> Result<String, Stri
         Expected::Stays => {
             world.run(REST);
             let cause = world.driver.cause().copied();
-            let kept = cause.is_some_and(|cause| Some(cause) == before || fault.is_told_by(&cause));
+            let kept = cause.is_some_and(|cause| Some(cause) == before || fault.is_reported_by(&cause));
             if world.driver.phase() != Phase::Faulted || !kept {
                 return fail(format!("{:?}: {before:?} became {cause:?}", world.driver.phase()));
             }
@@ -145,7 +145,7 @@ fn cell(fault: Fault, stage: Stage, control: ControlMode) -> Result<String, Stri
 /// Nothing that moves leaves after `from`, and the arm rests with its brakes closed.
 fn after_stop(world: &mut World, fault: Fault, from: u64) -> Result<(), String> {
     if let Some((at, node, word)) = world.motion_after(from) {
-        return Err(format!("node {node} is told to move ({word:?}) {} µs after the stop", at - from));
+        return Err(format!("node {node} is commanded to move ({word:?}) {} µs after the stop", at - from));
     }
     rests(world, fault)
 }
@@ -153,7 +153,7 @@ fn after_stop(world: &mut World, fault: Fault, from: u64) -> Result<(), String> 
 fn rests(world: &World, fault: Fault) -> Result<(), String> {
     let arm = &world.bus.peer().arm;
     for (j, node) in arm.nodes().iter().enumerate() {
-        // A node that neither hears nor speaks cannot be told, and this one does not watch either.
+        // A node that neither hears nor speaks cannot be commanded, and this one does not watch either.
         let deaf = fault == Fault::Silent && node.id() == VICTIM;
         let velocity = arm.simulation().velocity(j);
         if !deaf && (!node.brake_closed() || velocity.abs() > 1e-3) {
@@ -167,22 +167,22 @@ fn rests(world: &World, fault: Fault) -> Result<(), String> {
     Ok(())
 }
 
-/// The cause is told, and nothing is enabled without an explicit act.
+/// The cause is reported, and nothing is enabled without an explicit act.
 fn latched(world: &mut World, fault: Fault) -> Result<(), String> {
     let Some(cause) = world.driver.cause().copied() else { return Err("nothing is latched".into()) };
-    if !fault.is_told_by(&cause) {
-        return Err(format!("told is: {cause}"));
+    if !fault.is_reported_by(&cause) {
+        return Err(format!("reported is: {cause}"));
     }
     world.pilot.enable = false;
     match world.driver.enable() {
-        Err(Refusal::Latched(told)) if told == cause => {}
+        Err(Refusal::Latched(kept)) if kept == cause => {}
         other => return Err(format!("enabling without acknowledging: {other:?}")),
     }
     let at = world.now();
     fault.repair(world);
     world.run(200_000);
     match world.motion_after(at) {
-        Some(_) => Err("moves again without being told".into()),
+        Some(_) => Err("moves again without a command".into()),
         None => Ok(()),
     }
 }

@@ -1,4 +1,4 @@
-//! A joint that does not do what it is told: each way stops the arm, is told, and stays stopped.
+//! A joint that does not do what it is commanded: each way stops the arm, is reported, and stays stopped.
 
 use super::rules::{running, started};
 use super::world::{CYCLE, VICTIM, Wire, World};
@@ -9,13 +9,14 @@ use powerball::bus::driver::lwa4p::LWA4P;
 use powerball::bus::driver::{Cause, ControlMode, Phase, Refusal};
 use powerball::virtual_arm::slave::Fault;
 
-/// Runs until the arm is stopped by a cause that `told` knows, at most `cycles` from now; then nothing moves.
-fn stopped(mut world: World, cycles: u64, told: impl Fn(&Cause) -> bool) {
+/// Runs until the arm is stopped by a cause that `expected` accepts, at most `cycles` from now; then nothing
+/// moves.
+fn stopped(mut world: World, cycles: u64, expected: impl Fn(&Cause) -> bool) {
     let begin = world.now();
     assert!(world.run_until(cycles * CYCLE, |w| w.driver.cause().is_some()), "not seen in {cycles} cycles");
     let cause = *world.driver.cause().unwrap();
     println!("{} cycles: {cause}", (world.now() - begin) / CYCLE);
-    assert!(told(&cause) && cause.node() == Some(VICTIM), "{cause}");
+    assert!(expected(&cause) && cause.node() == Some(VICTIM), "{cause}");
     assert!(world.run_until(4_000_000, |w| w.driver.phase() == Phase::Faulted));
     let at = world.now();
     world.run(500_000);
@@ -75,14 +76,15 @@ fn an_encoder_that_stands_still_stops_the_arm() {
 fn bits_of_the_statusword_stop_the_arm() {
     let interpolated = ControlMode::InterpolatedPosition;
     let set = |bits| Wire::Status { set: bits, clear: 0 };
-    let hindered = |why| move |cause: &Cause| matches!(cause, Cause::Hindered(_, told, _) if *told == why);
+    let hindered =
+        |why| move |cause: &Cause| matches!(cause, Cause::Hindered(_, reported, _) if *reported == why);
     stopped(with_wire(interpolated, set(Statusword::MODE_13)), 3, hindered(Hindrance::FollowingError));
     stopped(
         with_wire(interpolated, Wire::Status { set: 0, clear: Statusword::MODE_12 }),
         5,
         hindered(Hindrance::NotInterpolating),
     );
-    // A warning is told, once, and stops nothing.
+    // A warning is reported, once, and stops nothing.
     let mut world = with_wire(interpolated, set(Statusword::WARNING));
     world.run(50 * CYCLE);
     assert_eq!(world.driver.phase(), Phase::Running);

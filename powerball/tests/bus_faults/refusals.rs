@@ -72,12 +72,12 @@ fn another_node_than_expected_is_refused() {
 
     // A device of another maker, one that is no drive, and one that does not say what it is.
     let (vendor, device_type) = (Object::new(0x1018, 1), Object::new(0x1000, 0));
-    let told = |wire| refused(started(ControlMode::InterpolatedPosition, LWA4P, true, wire)).to_string();
+    let refusal = |wire| refused(started(ControlMode::InterpolatedPosition, LWA4P, true, wire)).to_string();
     let expected = "node 5: vendor 0xDEADBEEF (0x1018:1) where 0x0000015E is expected";
-    assert_eq!(told(Wire::Misread(vendor, 0xDEAD_BEEF)), expected);
+    assert_eq!(refusal(Wire::Misread(vendor, 0xDEAD_BEEF)), expected);
     let expected = "node 5: device type 0x00030191 (0x1000:0), which is CiA 401 where CiA 402 is expected";
-    assert_eq!(told(Wire::Misread(device_type, 0x0003_0191)), expected);
-    assert!(told(Wire::Refuse(device_type)).contains("0x1000:0"));
+    assert_eq!(refusal(Wire::Misread(device_type, 0x0003_0191)), expected);
+    assert!(refusal(Wire::Refuse(device_type)).contains("0x1000:0"));
 }
 
 /// What the caller accepts is noted by name, and the arm runs.
@@ -102,7 +102,7 @@ fn another_node_than_expected_runs_where_it_is_accepted() {
 }
 
 #[test]
-fn a_bus_that_cannot_carry_it_is_refused_and_a_tight_one_told() {
+fn a_bus_that_cannot_carry_it_is_refused_and_a_tight_one_reported() {
     let entry = |index, bits| Entry::new(Object::new(index, 0), bits);
     // What a public DCF maps: at 200 Hz and 500 kbit/s impossible.
     let mut profile = LWA4P;

@@ -271,9 +271,9 @@ fn a_motor_supply_that_is_off_at_boot_costs_no_restart() {
     world.driver.start(ControlMode::Velocity, false).unwrap();
     assert!(world.run_until(20_000_000, |w| w.driver.phase() == Phase::Faulted));
     let cause = *world.driver.cause().unwrap();
-    let told =
+    let named =
         matches!(cause, Cause::Transition(VICTIM, _, _, Hindrance::NoVoltage) | Cause::DriveFault(VICTIM, _));
-    assert!(told, "{cause}");
+    assert!(named, "{cause}");
     world.bus.peer_mut().arm.fault(VICTIM, Fault::Supply(true));
     world.driver.acknowledge().unwrap();
     assert!(
@@ -378,13 +378,13 @@ fn a_caller_that_stops_giving_set_points_stops_the_arm() {
 }
 
 #[test]
-fn storms_are_counted_and_told_once() {
+fn storms_are_counted_and_reported_once() {
     let mut world = running(ControlMode::Velocity);
     world.bus.peer_mut().storm = 40;
     world.run(300_000);
     assert_eq!(world.driver.joints()[2].counters.emergencies, 40);
-    let told = world.driver.notes().filter(|note| matches!(note.cause, Cause::Emergency(VICTIM, _))).count();
-    assert!((1..=2).contains(&told), "{told}");
+    let noted = world.driver.notes().filter(|note| matches!(note.cause, Cause::Emergency(VICTIM, _))).count();
+    assert!((1..=2).contains(&noted), "{noted}");
 }
 
 #[test]

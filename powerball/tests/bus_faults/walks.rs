@@ -16,7 +16,7 @@ const STEPS: usize = 40;
 /// A stop has reached all drives by then: the slowest cell of the matrix, and the frames' time on the wire. Counted
 /// from when the driver knows its cause.
 const STOPPED: Micros = 2 * CYCLE;
-/// A frame that was queued before may be on the wire for so long.
+/// A frame that was queued before may be on the wire for this long.
 const WIRE: Micros = 2_500;
 
 /// More torque than joint 3 has wherever it would be beyond its start by 0.04 rad: half of the pilot's swing.
@@ -202,7 +202,9 @@ impl Walk {
                 at > from + WIRE && allowed.is_none_or(|allowed| at < *allowed)
             });
             if moves && forbidden {
-                return Err(format!("node {node} is told to move ({word:?}) at {at}, with a cause latched"));
+                return Err(format!(
+                    "node {node} is commanded to move ({word:?}) at {at}, with a cause latched"
+                ));
             }
         }
         self.set_points()
@@ -215,7 +217,7 @@ impl Walk {
             let mut last: Option<(Micros, [f64; 2])> = None;
             let outside = |q: f64| q < joint.position[0] - 1e-3 || q > joint.position[1] + 1e-3;
             for (at, q, follows) in self.points(joint.node) {
-                // A joint that commutates is told to stay where it is, wherever its jerk takes it.
+                // A joint that commutates is commanded to stay where it is, wherever its jerk takes it.
                 let running = self.running.iter().any(|(from, until)| (from + CYCLE..=*until).contains(&at));
                 if !(follows && running) {
                     last = None;

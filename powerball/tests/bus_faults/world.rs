@@ -45,12 +45,12 @@ pub(crate) enum Wire {
         set: u16,
         clear: u16,
     },
-    /// The position, last in its first transmit PDO, is off by so many mdeg.
+    /// The position, last in its first transmit PDO, is off by `by` mdeg.
     Shift {
         by: i32,
         frames: u32,
     },
-    /// Its first transmit PDO comes twice: more would be too much for the bus.
+    /// The node's first transmit PDO comes twice: more would be too much for the bus.
     Twice,
     /// The position stays as it is in the first frame.
     Freeze(Option<i32>),
@@ -59,9 +59,9 @@ pub(crate) enum Wire {
     /// The velocity, first in its second transmit PDO, and the torque, second in its first, read this.
     Velocity(i32),
     Torque(i16),
-    /// Its server refuses this object.
+    /// The node's server refuses this object.
     Refuse(Object),
-    /// Its server reads this value for this object, whatever was written.
+    /// The node's server reads this value for this object, whatever was written.
     Misread(Object, u32),
 }
 

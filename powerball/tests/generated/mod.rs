@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// A crate around a generated controller: without std and with every warning an error, and a program that
-/// reads states and prints torques. Built beside the other generated crates, so that nalgebra is built once.
+/// reads states and prints torques. Built next to the other generated crates, so that nalgebra is built once.
 pub(crate) fn controller(folder: &Path) -> PathBuf {
     let name = format!("controller_{}", folder.file_name().unwrap().to_str().unwrap());
     std::fs::create_dir_all(folder.join("src")).unwrap();

@@ -75,7 +75,7 @@ def left_by_a_crash(name, db, ending):
 
 
 def crashed():
-    # Half of the messages are in the file, half of them beside it.
+    # Half of the messages are in the file, half of them next to it.
     db = bag("waiting.db3", "WAL")
     put(db, range(SAMPLES // 2))
     db.execute("PRAGMA wal_checkpoint(TRUNCATE)")

@@ -289,7 +289,8 @@ def answer_the_master(powerball, place, node):
 
 class Drive:
     """One of six drives of python-canopen's own: LocalNode with its SDO server, NMT slave and heartbeat; the state
-    machine of CiA 402 and the PDOs as mapped are written here, without powerball. Its joint is where it is told to be."""
+    machine of CiA 402 and the PDOs as mapped are written here, without powerball. The joint is where it is
+    commanded to be."""
 
     def __init__(self, arm, number):
         self.arm, self.id = arm, number
@@ -407,8 +408,8 @@ def trajectory(folder, seconds):
 
 
 def record(powerball, place, path, code, fail=None):
-    """Records a trajectory on an arm of python's; `fail` befalls node 5 while it moves. Gives the arm, what was told, and
-    after how many ms the others had heard the quick stop, where there was one."""
+    """Records a trajectory on an arm of python's; `fail` befalls node 5 while it moves. Gives the arm, what was
+    reported, and after how many ms the others had heard the quick stop, where there was one."""
     arm = PythonArm(place)
     log = path.replace("path", "log")
     command = [powerball, "record", "--trajectory", path, "--out", log, "--force", "--json", "--bus", place.url]
@@ -423,15 +424,15 @@ def record(powerball, place, path, code, fail=None):
                 time.sleep(0.002)
             failed = time.monotonic()
             fail(arm, victim)
-        out, told = run.communicate(timeout=60)
+        out, messages = run.communicate(timeout=60)
         if run.returncode != code:
-            raise AssertionError(f"exit code {run.returncode}: {out} {told}")
+            raise AssertionError(f"exit code {run.returncode}: {out} {messages}")
         stops = [drive.quick_stop for drive in arm.drives if not drive.silent]
         took = (max(stops) - failed) * 1e3 if fail and all(stops) else None
         at_rest = [drive.state not in (0x27, 0x07) for drive in arm.drives if not drive.silent]
         if not all(at_rest):
-            raise AssertionError(f"not without torque: {at_rest}; {told}")
-        return arm, (json.loads(out) if code == 0 else told), took, log
+            raise AssertionError(f"not without torque: {at_rest}; {messages}")
+        return arm, (json.loads(out) if code == 0 else messages), took, log
     finally:
         run.kill()
         run.wait()
@@ -505,9 +506,9 @@ def python_is_the_arm(powerball, failures):
         times = [float(row[0]) for row in rows]
         check("and its time", all(b > a for a, b in zip(times, times[1:])) and 2.9 < times[-1] < 5.0, times[-1])
         for name, fail, word in failures:
-            _, told, took, _ = record(powerball, Udp(), trajectory(folder, 12.0), 1, fail)
-            check(f"{name}: all drives hear the stop after {took:.0f} ms", took < 500.0, told)
-            check(f"  told: {told.strip()[:90]}", word in told.lower(), told)
+            _, messages, took, _ = record(powerball, Udp(), trajectory(folder, 12.0), 1, fail)
+            check(f"{name}: all drives hear the stop after {took:.0f} ms", took < 500.0, messages)
+            check(f"  reported: {messages.strip()[:90]}", word in messages.lower(), messages)
 
 
 def main():

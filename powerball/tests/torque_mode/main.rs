@@ -70,7 +70,7 @@ struct Ran {
     carried_on: u64,
 }
 
-/// Follows with a fault at a joint from so many s of the path on.
+/// Follows with a fault at a joint from a time of the path on, s.
 fn follow(
     model: &ModelArm,
     path: &Path<6>,
@@ -224,7 +224,7 @@ fn check(bench: &Bench, fault: Fault, words: &str, joint: usize, stop: Stop) {
     let what = format!("{}, {words}, joint {}: {}", bench.name, joint + 1, stop.words());
     assert!(stop.off <= allowed(bench, fault), "{what}");
     let Some(cause) = stop.cause.filter(|_| fault != Fault::Powerless || bench.name != "float") else {
-        // An arm that floats at rest and is told that it does stays where it is.
+        // An arm that floats at rest and is informed that it does stays where it is.
         assert!(bench.name == "float", "{what}");
         return;
     };

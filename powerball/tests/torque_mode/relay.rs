@@ -10,7 +10,7 @@ use powerball::virtual_arm::slave;
 use std::cell::Cell;
 use std::rc::Rc;
 
-/// What goes wrong at the victim from the moment on at which the relay is told.
+/// What goes wrong at the victim from the moment on at which the relay is commanded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fault {
     None,

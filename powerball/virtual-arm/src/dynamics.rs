@@ -327,7 +327,7 @@ impl Body {
         Body::about_centre(mass, Vector3::from(centre), tensor, rotor)
     }
 
-    /// The same body moved by `by`, m, without turning it.
+    /// This body moved by `by`, m, without turning it.
     #[must_use]
     pub fn moved(&self, by: Vector3<f64>) -> Self {
         let centre = self.moment / self.mass;

@@ -87,7 +87,7 @@ pub fn plant() -> Result<Plant, Diagnostics> {
     build(Chain::new(&arm()?))
 }
 
-/// The same arm with its base mounted otherwise: gravity in the base frame, m/s².
+/// The arm of [`plant`] with its base mounted otherwise: gravity in the base frame, m/s².
 ///
 /// # Errors
 /// As [`arm`].
@@ -154,7 +154,7 @@ pub fn setup(start: [f64; 6], seed: u64) -> Result<Setup, Diagnostics> {
     Ok(Setup { plant: plant()?, modules: modules()?, start: start.to_vec(), age: 0.0, seed })
 }
 
-/// The same with drives that have the current mode that the bus profile knows.
+/// A setup with drives that have the current mode that the bus profile knows.
 #[must_use]
 pub fn with_current_mode(setup: Setup) -> Setup {
     match LWA4P.current {

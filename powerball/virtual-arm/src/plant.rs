@@ -1,6 +1,6 @@
 //! The plant: an arm that follows a motion, and the log that its drives would give.
 //!
-//! Also here: the virtual arm with what no model is told of it, as a file.
+//! Also here: the virtual arm with what no model knows about it, as a file.
 
 use super::dynamics::Dynamics;
 use super::effect::{Instant, PlantEffect, State};
@@ -32,7 +32,7 @@ pub struct Sensors {
     pub colour_time: f64,
 }
 
-/// An arm with friction, sensors and possibly effects that no model was told of.
+/// An arm with friction, sensors and possibly effects that no model knows about.
 #[derive(Clone, Debug)]
 pub struct Plant {
     dynamics: Dynamics,
@@ -83,7 +83,7 @@ impl Plant {
 
     /// Follows a motion exactly, as a stiff position servo does, and records it from time `start` (s) on.
     ///
-    /// The same plant, motion, start and seed give the same log, to the bit.
+    /// Equal plant, motion, start and seed give the same log, to the bit.
     pub fn record(&self, motion: &Motion, start: f64, seed: u64) -> SimulatedLog {
         let n = motion.dof();
         let mut torques = Vec::with_capacity(motion.q.len());
@@ -221,7 +221,7 @@ impl SimulatedLog {
     }
 }
 
-// The virtual arm with what no model is told of it, as a file: so that the arm of a session can be met
+// The virtual arm with what no model knows about it, as a file: so that the arm of a session can be met
 // again.
 
 /// A virtual LWA 4P by its undeclared effect.
@@ -230,7 +230,7 @@ impl SimulatedLog {
 pub struct Undeclared {
     /// What is in the plant and in no model.
     pub effect: PlantEffect,
-    /// Its age, s: what warms has been warming for so long.
+    /// Age of the plant, s: what warms has been warming for this time.
     pub age: f64,
 }
 

@@ -317,7 +317,7 @@ pub struct Gains {
     pub position: f64,
     /// Velocity loop: N·m for each rad/s.
     pub velocity: f64,
-    /// Its integral part: N·m/s for each rad/s.
+    /// Integral part of the velocity loop: N·m/s for each rad/s.
     pub integral: f64,
     /// Torque at the current limit, N·m.
     pub limit: f64,

@@ -2,7 +2,7 @@
 
 
 class Error(Exception):
-    """Any error of this package beside wrong arguments, which are ``ValueError``."""
+    """Any error of this package except wrong arguments, which are ``ValueError``."""
 
 
 class RefusedError(Error):

@@ -35,5 +35,5 @@ def model_text(model: Model) -> Tuple[str, str]:
 
 
 def optional_model(model: Optional[Model]) -> Optional[Tuple[str, str]]:
-    """The same where there may be none."""
+    """As ``model_text``, where there may be no model."""
     return None if model is None else model_text(model)

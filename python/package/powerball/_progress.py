@@ -1,4 +1,4 @@
-"""Who is told what a long computation is doing."""
+"""Where the progress of a long computation is reported."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Progress = Union[bool, Callable[[str], object]]
 
 @contextmanager
 def listener(progress: Progress) -> Iterator[Optional[Callable[[str], object]]]:
-    """The function that is told."""
+    """The function that the progress is reported to."""
     if not progress:
         yield None
     elif callable(progress):

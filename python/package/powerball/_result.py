@@ -27,12 +27,12 @@ class Spread:
     samples: int
 
 
-def spread(told: Optional[Dict[str, Any]]) -> Optional[Spread]:
+def spread(parsed: Optional[Dict[str, Any]]) -> Optional[Spread]:
     """A spread of its JSON."""
-    if told is None:
+    if parsed is None:
         return None
     return Spread(
-        numbers(told["rms"]), numbers(told["relative"]), numbers(told["band"]), int(told["samples"])
+        numbers(parsed["rms"]), numbers(parsed["relative"]), numbers(parsed["band"]), int(parsed["samples"])
     )
 
 
@@ -46,12 +46,12 @@ class Result:
 
     def __init__(self, core: Any) -> None:
         self._core = core
-        self._told: Dict[str, Any] = json.loads(core.json())
+        self._json: Dict[str, Any] = json.loads(core.json())
 
     def to_dict(self) -> Dict[str, Any]:
         """The result as the command's ``--json`` prints it."""
-        told: Dict[str, Any] = json.loads(self._core.json())
-        return told
+        parsed: Dict[str, Any] = json.loads(self._core.json())
+        return parsed
 
     def save(self, directory: PathLike) -> None:
         """Writes the files that the command writes into its ``--out``, a folder that is made if missing."""
@@ -59,8 +59,8 @@ class Result:
 
     @property
     def warnings(self) -> List[str]:
-        """What is to be said of the logs, the arm file and the fit."""
-        return list(self._told.get("warnings", []))
+        """What is to be reported about the logs, the arm file and the fit."""
+        return list(self._json.get("warnings", []))
 
 
 class OfLogs(Result):
@@ -69,13 +69,13 @@ class OfLogs(Result):
     @property
     def conventions(self) -> Optional[Dict[str, Any]]:
         """What the columns of the logs are: signs, units, gravity, delay; and the map that corrects them."""
-        told: Optional[Dict[str, Any]] = self._told.get("conventions")
-        return told
+        parsed: Optional[Dict[str, Any]] = self._json.get("conventions")
+        return parsed
 
     @property
     def unusable(self) -> List[str]:
         """Why this result should not be used (exit 3 of the command); empty where it can be."""
-        return list(self._told.get("unusable", []))
+        return list(self._json.get("unusable", []))
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:

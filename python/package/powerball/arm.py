@@ -21,7 +21,7 @@ Lock = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Limits:
-    """What an arm file says of its joints; NaN where it says nothing."""
+    """What an arm file states about its joints; NaN where it states nothing."""
 
     #: Lower and upper position limit, (n, 2), rad or m.
     position: Array
@@ -40,7 +40,7 @@ class SetParameter:
     name: str
     #: Coefficient of each of the arm's parameters in the sum.
     terms: Dict[str, float]
-    #: The same as exact text.
+    #: The coefficients as exact text.
     exact_terms: Dict[str, str]
 
 
@@ -50,7 +50,7 @@ class ParameterSet:
 
     #: "minimal", "symbolic", "published" or "full".
     kind: str
-    #: Its parameters in the order of arrays of values and of the regressor's columns.
+    #: The set's parameters in the order of arrays of values and of the regressor's columns.
     parameters: List[SetParameter]
     #: Rank of its columns for the numbers in the file.
     rank: int
@@ -77,7 +77,7 @@ class Check:
     reasons: List[str]
     #: The pose, (n,), at which the mass matrix is worst, rad or m.
     pose: Array
-    #: Its smallest eigenvalue there, kg·m².
+    #: The smallest eigenvalue of the mass matrix there, kg·m².
     min_eigenvalue: float
 
 
@@ -201,7 +201,7 @@ class Arm(Functions):
 
     @property
     def limits(self) -> Limits:
-        """What the file says of the joints' limits."""
+        """What the file states about the joints' limits."""
         rows = self._core.limits
         nan = float("nan")
         position = [row[0] or [nan, nan] for row in rows]
@@ -226,7 +226,7 @@ class Arm(Functions):
 
     @property
     def values(self) -> Dict[str, float]:
-        """Their values, SI units, as the URDF or MuJoCo model gives them; empty for an arm file."""
+        """Parameter values, SI units, as the URDF or MuJoCo model gives them; empty for an arm file."""
         return dict(self._core.values)
 
     @property
@@ -250,7 +250,7 @@ class Arm(Functions):
         return self._core.frames
 
     def at_frame(self, name: str) -> Arm:
-        """The same arm with its tool at one of its frames: ``arm.at_frame("wrist").jacobian(q)``.
+        """This arm with its tool at one of its frames: ``arm.at_frame("wrist").jacobian(q)``.
 
         Raises: ``ValueError`` where the arm has no such frame.
         """
@@ -265,7 +265,7 @@ class Arm(Functions):
     def sets(self) -> Dict[str, ParameterSet]:
         """The parameter sets: "full", "minimal", "symbolic", and "published" where the file has one."""
         if self._sets is None:
-            self._sets = {kind: _set(kind, told) for kind, told in json.loads(self._core.sets()).items()}
+            self._sets = {kind: _set(kind, parsed) for kind, parsed in json.loads(self._core.sets()).items()}
         return self._sets
 
     def set_values(self, values: Optional[Values] = None, *, parameters: str = "minimal") -> Array:
@@ -343,11 +343,11 @@ def _shown(value: float) -> str:
 _TAKES_VALUES = {name for name, arguments, _, _ in _core.functions() if "parameters" in arguments}
 
 
-def _set(kind: str, told: Dict[str, Any]) -> ParameterSet:
+def _set(kind: str, parsed: Dict[str, Any]) -> ParameterSet:
     def parameter(entry: Dict[str, Any]) -> SetParameter:
         terms = {term["parameter"]: term["value"] for term in entry["terms"]}
         exact = {term["parameter"]: term["coefficient"] for term in entry["terms"]}
         return SetParameter(entry["name"], terms, exact)
 
-    parameters = [parameter(entry) for entry in told["parameters"]]
-    return ParameterSet(kind, parameters, told["rank"], told["exact"], told["relations"])
+    parameters = [parameter(entry) for entry in parsed["parameters"]]
+    return ParameterSet(kind, parameters, parsed["rank"], parsed["exact"], parsed["relations"])

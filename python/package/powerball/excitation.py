@@ -43,7 +43,7 @@ class Excited:
 
     def __init__(self, core: _core.Excited) -> None:
         self._core = core
-        self._told: Dict[str, Any] = json.loads(core.json())
+        self._json: Dict[str, Any] = json.loads(core.json())
 
     @property
     def trajectories(self) -> List[Trajectory]:
@@ -58,17 +58,17 @@ class Excited:
     @property
     def condition(self) -> float:
         """Condition number of the regressor along them, columns normalised."""
-        return float(self._told["conditions"]["normalised"])
+        return float(self._json["conditions"]["normalised"])
 
     @property
     def assumed(self) -> List[str]:
         """What had to be assumed."""
-        return list(self._told["assumed"])
+        return list(self._json["assumed"])
 
     def to_dict(self) -> Dict[str, Any]:
         """The result as ``powerball excite --json`` prints it, without the names of files."""
-        told: Dict[str, Any] = json.loads(self._core.json())
-        return told
+        parsed: Dict[str, Any] = json.loads(self._core.json())
+        return parsed
 
     def save(self, path: PathLike, report: Optional[PathLike] = None) -> None:
         """Writes the first trajectory as CSV, and a page with figures where ``report`` names one."""
@@ -80,7 +80,7 @@ class Excited:
         return f"<Excited: condition number {self.condition:.2f}, {self.trajectory.t[-1]:.1f} s>"
 
     def _repr_html_(self) -> str:
-        joints = self._told.get("joints") or self._told["trajectories"][0]["joints"]
+        joints = self._json.get("joints") or self._json["trajectories"][0]["joints"]
         rows = []
         for j, joint in enumerate(joints):
             low, high = joint["position"]

@@ -21,11 +21,11 @@ from .rule import Rule, rule_text
 class Effect:
     """An effect that the model lacks, with its evidence."""
 
-    #: Its name, as docs/explain.md lists them.
+    #: The effect's name, as docs/explain.md lists them.
     effect: str
-    #: Its joints, from 1.
+    #: The joints it acts on, from 1.
     joints: List[int]
-    #: Its physical reading, SI units.
+    #: The physical values, SI units.
     parameters: Dict[str, Any]
     #: The standard error of its size on each joint, a share of it; None where it is not of the fit.
     relative_std: List[Optional[float]]
@@ -36,7 +36,7 @@ class Effect:
     p_value: float
     #: How often such a name is right.
     probability: float
-    #: Its gain over that of the next best name.
+    #: The name's gain over that of the next best name.
     margin: float
     #: Share of the residual's excess over the noise floor that stays on its joints.
     leftover: float
@@ -122,13 +122,13 @@ class Explained(OfLogs):
             left = math.nan if entry["left"] is None else entry["left"]
             return Verdict(entry["joint"], entry["state"], left, entry["advice"])
 
-        return [of(entry) for entry in self._told["verdict"]]
+        return [of(entry) for entry in self._json["verdict"]]
 
     @property
     def logs(self) -> List[Dict[str, Any]]:
         """Log by log, those that were fitted first: ``log``, ``like_the_others`` and what ``differs``."""
-        told: List[Dict[str, Any]] = self._told["logs"]
-        return told
+        parsed: List[Dict[str, Any]] = self._json["logs"]
+        return parsed
 
     @property
     def effects(self) -> List[Effect]:
@@ -150,7 +150,7 @@ class Explained(OfLogs):
                 rivals=[(rival["effect"], rival["why_not"]) for rival in entry["rivals"]],
             )
 
-        return [of(entry) for entry in self._told["effects"]]
+        return [of(entry) for entry in self._json["effects"]]
 
     @property
     def laws(self) -> List[Law]:
@@ -167,7 +167,7 @@ class Explained(OfLogs):
                 nearest=entry["nearest"],
             )
 
-        return [of(entry) for entry in self._told["laws"]]
+        return [of(entry) for entry in self._json["laws"]]
 
     @property
     def before(self) -> Spread:
@@ -180,31 +180,31 @@ class Explained(OfLogs):
         return self._spread("after", "validate")
 
     def _spread(self, when: str, of: str) -> Spread:
-        found = spread(self._told[when][of])
+        found = spread(self._json[when][of])
         assert found is not None
         return found
 
     @property
     def noise_floor(self) -> Array:
         """What white measurement noise alone would leave, (n,), N·m."""
-        return numbers(self._told["noise_floor"])
+        return numbers(self._json["noise_floor"])
 
     @property
     def explainable(self) -> Array:
         """The share of the squared error left on the validation set that some smooth law would take away, (n,)."""
-        return numbers(self._told["explainable"])
+        return numbers(self._json["explainable"])
 
     @property
     def unattributed(self) -> Optional[Dict[str, Any]]:
         """What stays without a name, and the signals that it depends on."""
-        told: Optional[Dict[str, Any]] = self._told["unattributed"]
-        return told
+        parsed: Optional[Dict[str, Any]] = self._json["unattributed"]
+        return parsed
 
     @property
     def next_experiment(self) -> Optional[Dict[str, Any]]:
         """What to record to tell names apart that these logs leave open."""
-        told: Optional[Dict[str, Any]] = self._told["next_experiment"]
-        return told
+        parsed: Optional[Dict[str, Any]] = self._json["next_experiment"]
+        return parsed
 
     @property
     def next_trajectory(self) -> Optional[Trajectory]:
@@ -218,7 +218,7 @@ class Explained(OfLogs):
 
     def __repr__(self) -> str:
         named = ", ".join(f"{e.effect} on {_joints(e.joints)}" for e in self.effects) or "no effect"
-        return f"<Explained {self._told['arm']}: {named}>"
+        return f"<Explained {self._json['arm']}: {named}>"
 
     def _repr_html_(self) -> str:
         effects = [

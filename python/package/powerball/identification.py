@@ -47,7 +47,7 @@ class JointFriction:
     joint: int
     #: γ1 to γ5, (5,).
     gamma: Array
-    #: Their standard errors; NaN where the logs do not determine them.
+    #: Standard errors of γ1 to γ5, (5,); NaN where the logs do not determine them.
     std: Array
     #: A constant torque, N·m or N.
     offset: Optional[float]
@@ -62,12 +62,12 @@ class Identified(OfLogs):
     def parameters(self) -> List[ParameterEstimate]:
         """The minimal set's values with their standard errors."""
         keys = ("name", "value", "std", "relative_std")
-        return [ParameterEstimate(*(entry.get(key) for key in keys)) for entry in self._told["parameters"]]
+        return [ParameterEstimate(*(entry.get(key) for key in keys)) for entry in self._json["parameters"]]
 
     @property
     def values(self) -> Dict[str, float]:
-        """The same by name, for the functions of an arm: ``arm.gravity(q, identified)``."""
-        return {entry["name"]: entry["value"] for entry in self._told["parameters"]}
+        """The minimal set's values by name, for the functions of an arm: ``arm.gravity(q, identified)``."""
+        return {entry["name"]: entry["value"] for entry in self._json["parameters"]}
 
     @property
     def friction(self) -> List[JointFriction]:
@@ -78,29 +78,29 @@ class Identified(OfLogs):
             std = numbers(entry["std"])
             return JointFriction(entry["joint"], gamma, std, entry.get("offset"), entry.get("coulomb_std"))
 
-        return [of(entry) for entry in self._told["friction"]]
+        return [of(entry) for entry in self._json["friction"]]
 
     @property
     def fit(self) -> Spread:
         """What the fit leaves of its own logs."""
-        found = spread(self._told["fit"])
+        found = spread(self._json["fit"])
         assert found is not None
         return found
 
     @property
     def validate(self) -> Optional[Spread]:
         """What the model leaves of the validation logs, where there are any."""
-        return spread(self._told["validate"])
+        return spread(self._json["validate"])
 
     @property
     def physically_consistent(self) -> bool:
         """Whether a real arm can have these values."""
-        return bool(self._told["physically_consistent"])
+        return bool(self._json["physically_consistent"])
 
     @property
     def consistent(self) -> Dict[str, float]:
         """The nearest values that a real arm can have, by the names of the arm's parameters."""
-        return dict(self._told["consistent"]["parameters"])
+        return dict(self._json["consistent"]["parameters"])
 
     def model_json(self) -> str:
         """identified.json."""
@@ -110,14 +110,14 @@ class Identified(OfLogs):
         judged = self.validate or self.fit
         errors = ", ".join(f"{100 * share:.1f} %" for share in judged.relative)
         what = "on validation logs" if self.validate else "on its own logs"
-        return f"<Identified {self._told['arm']}: error {errors} of the torque {what}>"
+        return f"<Identified {self._json['arm']}: error {errors} of the torque {what}>"
 
     def _repr_html_(self) -> str:
         head = ["joint", "fit", "validation"] if self.validate else ["joint", "fit"]
         possible = "" if self.physically_consistent else " No real arm can have these values."
         return (
             "".join(paragraph(f"Do not use this result: {reason}.", strong=True) for reason in self.unusable)
-            + paragraph(f"{self._told['arm']}: {len(self.parameters)} parameters.{possible}", strong=True)
+            + paragraph(f"{self._json['arm']}: {len(self.parameters)} parameters.{possible}", strong=True)
             + table(head, error_rows([self.fit, self.validate]))
             + "".join(paragraph(warning) for warning in self.warnings)
         )
@@ -165,7 +165,7 @@ class JointVerdict:
     joint: int
     #: rms of the error, N·m or N.
     rms: float
-    #: Its 95 % interval.
+    #: 95 % interval of the rms.
     interval: Array
     #: rms of the error over rms of the torque.
     relative: float
@@ -185,17 +185,17 @@ class Verified(Result):
         def of(entry: Dict[str, Any]) -> JointVerdict:
             return JointVerdict(**{**entry, "interval": numbers(entry["interval"])})
 
-        return [of(entry) for entry in self._told["joints"]]
+        return [of(entry) for entry in self._json["joints"]]
 
     @property
     def within_tolerance(self) -> bool:
         """Whether no joint's error may be beyond the tolerance."""
-        return bool(self._told["within_tolerance"])
+        return bool(self._json["within_tolerance"])
 
     @property
     def tolerance(self) -> float:
         """As it was asked for."""
-        return float(self._told["tolerance"])
+        return float(self._json["tolerance"])
 
     def _repr_html_(self) -> str:
         rows = [
@@ -235,27 +235,27 @@ class Compared(Result):
     @property
     def differ(self) -> bool:
         """Whether they differ beyond what their errors explain."""
-        return bool(self._told["differ"])
+        return bool(self._json["differ"])
 
     @property
     def sentence(self) -> str:
         """All of it in words."""
-        return str(self._told["sentence"])
+        return str(self._json["sentence"])
 
     @property
     def parameters(self) -> List[Dict[str, Any]]:
         """The minimal set, as far as both determine it."""
-        return list(self._told["parameters"])
+        return list(self._json["parameters"])
 
     @property
     def friction(self) -> List[Dict[str, Any]]:
         """Friction curves, joint by joint."""
-        return list(self._told["friction"])
+        return list(self._json["friction"])
 
     @property
     def torque_difference(self) -> List[Dict[str, Any]]:
         """What all of it means in torque along the logs of a, joint by joint."""
-        return list(self._told["torque_difference"])
+        return list(self._json["torque_difference"])
 
     def _repr_html_(self) -> str:
         rows = [

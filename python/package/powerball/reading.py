@@ -40,11 +40,11 @@ def read_log(arm: Arm, log: LogLike, *, map: Optional[Map] = None) -> Recording:
 
 
 def inspect(file: PathLike, *, arm: Optional[Arm] = None, map: Optional[Map] = None) -> Dict[str, Any]:
-    """What ``powerball log --json`` says of a file: topics, columns, units, rates, gaps, warnings.
+    """What ``powerball log --json`` reports about a file: topics, columns, units, rates, gaps, warnings.
 
     With ``arm`` also the log that ``identify`` would read, or why it is none.
     """
-    told: Dict[str, Any] = json.loads(
+    parsed: Dict[str, Any] = json.loads(
         _core.inspect(os.fspath(file), said(map), None if arm is None else arm._core)
     )
-    return told
+    return parsed

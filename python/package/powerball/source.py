@@ -33,7 +33,7 @@ def generate(
     ``values`` baked in where they are given, columns for ``friction`` ("viscous", "coulomb", "tanh:SHAPE"),
     the module ``batch`` and the arm's own ``tests``. With ``model``, a result of ``identify`` or ``explain``,
     it is what ``powerball generate`` writes: rigid arm, friction and every effect, for the ``scalar`` "f32"
-    or "f64"; what a controller cannot make up for is told as a warning.
+    or "f64"; what a controller cannot make up for is reported as a warning.
     """
     names = None if functions is None else list(functions)
     if model is None:
@@ -58,8 +58,8 @@ def export(
     nearest real arm is taken, or values of all parameters. ``friction`` is where damping and friction are
     from; a result brings its own, unless it is ``False``. That of ``explain`` has effects, of which a MuJoCo
     model gets ripple, presliding and Stribeck's friction. Damping that is not larger than its own standard
-    error stays as it was, unless ``uncertain`` asks for it. What is to be said of the new file is given as a
-    warning.
+    error stays as it was, unless ``uncertain`` asks for it. What is to be reported about the new file is
+    given as a warning.
     """
     if isinstance(values, Mapping):
         text = (json.dumps(dict(values)), "values")

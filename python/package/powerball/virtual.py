@@ -15,11 +15,11 @@ from ._progress import Progress, listener
 class Truth:
     """What is in a virtual arm and not in its model."""
 
-    #: Its name, as ``Effect.effect`` gives it.
+    #: The effect's name, as ``Effect.effect`` gives it.
     effect: str
-    #: Its joints, from 1; empty where it is the whole arm's.
+    #: The effect's joints, from 1; empty where it is the whole arm's.
     joints: List[int]
-    #: Its figures in words.
+    #: The effect's figures in words.
     figures: str
 
 
@@ -33,7 +33,7 @@ class Session:
     log: List[str]
     #: Logs of other paths.
     validate: List[str]
-    #: What the model was not told.
+    #: What the model does not know.
     truth: Truth
 
 
@@ -47,7 +47,7 @@ def virtual_session(
 ) -> Session:
     """Drives the virtual LWA 4P along exciting paths over a CAN bus in memory; writes its logs into a folder.
 
-    The arm has an effect that its model is not told of: the one named, or one that ``seed`` draws.
+    The arm has an effect that its model does not know about: the one named, or one that ``seed`` draws.
     """
     with listener(progress) as tell:
         arm, fit, held_out, truth = _core.virtual_session(os.fspath(directory), seed, effect, tell)

@@ -32,7 +32,7 @@ pub struct ArmFunctions {
     pub model_size: usize,
     /// Begins one.
     pub begin: Option<Begin>,
-    /// Its torque.
+    /// The model's torque.
     pub torque: Option<Torque>,
 }
 
@@ -128,7 +128,8 @@ impl<const N: usize> Memory<N> {
         let Reference { q, dq, ddq } = motion;
         let room = room.as_mut_ptr().cast();
         let whole: SVector<f64, N> = result(|out| {
-            // SAFETY: the promise of `open`; the model was begun, temperatures may be null, the others have N numbers.
+            // SAFETY: the promise of `open`; the model was initialised, temperatures may be null, the others
+            // have N numbers.
             unsafe { torque(room, q.as_ptr(), dq.as_ptr(), ddq.as_ptr(), running, std::ptr::null(), out) }
         });
         whole - arm.mass_matrix(q) * ddq - arm.coriolis_times_velocity(q, dq) - arm.gravity(q)

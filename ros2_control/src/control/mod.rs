@@ -28,7 +28,7 @@ pub struct Options {
     pub period: f64,
     /// Angular frequency of the errors, rad/s; 0 takes the law's default.
     pub bandwidth: f64,
-    /// Their damping ratio.
+    /// Damping ratio of the errors.
     pub damping: f64,
     /// Angular frequency of the low pass over external torques, rad/s.
     pub observer_bandwidth: f64,
@@ -75,7 +75,7 @@ pub trait Control {
 /// What does not fit, in words.
 ///
 /// # Safety
-/// The functions are what the header says of them.
+/// The functions are as the header declares them.
 pub unsafe fn open(arm: &ArmFunctions, options: &Options) -> Result<Box<dyn Control>, String> {
     Ok(match arm.joints {
         1 => Box::new(Loop::<1>::new(arm, options)?),
@@ -90,7 +90,7 @@ pub unsafe fn open(arm: &ArmFunctions, options: &Options) -> Result<Box<dyn Cont
     })
 }
 
-/// Whether there is a control for so many joints.
+/// Whether there is a control for this many joints.
 fn known(joints: usize) -> Result<(), String> {
     if (1..=8).contains(&joints) {
         Ok(())

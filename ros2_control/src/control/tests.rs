@@ -51,12 +51,12 @@ unsafe extern "C" fn torque(
     result: *mut f64,
 ) -> c_int {
     // SAFETY: eight bytes are read, one number each.
-    let (begun, q, dq, ddq) = unsafe { (model.cast::<u64>().read(), q.read(), dq.read(), ddq.read()) };
-    if begun == 7 {
+    let (word, q, dq, ddq) = unsafe { (model.cast::<u64>().read(), q.read(), dq.read(), ddq.read()) };
+    if word == 7 {
         // SAFETY: one number is written.
         unsafe { result.write(INERTIA * ddq + weight(q) + friction(dq)) };
     }
-    c_int::from(begun != 7)
+    c_int::from(word != 7)
 }
 
 const ARM: ArmFunctions = ArmFunctions {

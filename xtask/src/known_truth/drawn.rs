@@ -111,7 +111,7 @@ pub(super) fn write(page: &mut String, data: &Path, draws: u64, pairs: u64) -> R
     }
     let _ = writeln!(
         page,
-        "\n## Clean pairs\n\nThe first half of a clean log against its second one, {pairs} pairs: {} logs are said to differ.",
+        "\n## Clean pairs\n\nThe first half of a clean log against its second one, {pairs} pairs: {} logs are reported to differ.",
         different.len()
     );
     for sentence in different {
@@ -208,7 +208,7 @@ fn put_in(rng: &mut ChaCha8Rng, kind: Kind, body: &RigidArm, log: &mut Log) -> R
     Ok(())
 }
 
-/// So much of a torque that its largest deviation is this share of the joint's own.
+/// A multiple of `unit` whose largest deviation is this share of the joint's own.
 fn scaled(unit: Vec<Vec<f64>>, torque: &[Vec<f64>], share: f64) -> Vec<Vec<f64>> {
     let rms = |x: &[f64]| (x.iter().map(|v| v * v).sum::<f64>() / x.len().max(1) as f64).sqrt();
     let ratios = unit.iter().zip(torque).map(|(own, torque)| rms(own) / deviation(torque).max(1e-9));

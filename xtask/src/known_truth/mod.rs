@@ -1,5 +1,5 @@
-//! Measured logs in which something is that their owners put there, or that a draw put there: what `explain` says of
-//! it. A question and its truth stand in a table; the page is made of the answers.
+//! Measured logs in which something is that their owners put there, or that a draw put there: what `explain`
+//! reports about it. A question and its truth stand in a table; the page is made of the answers.
 
 mod drawn;
 mod owners;
@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
 
 const HEAD: &str = "# Measured logs with a known truth
 
-What a program says of a robot is easily believed. Here it is asked about logs of real arms in which something is whose owners, or a seeded draw, say what it
+What a program reports about a robot is easily believed. Here it is asked about logs of real arms in which something is whose owners, or a seeded draw, say what it
 is. The answers are those of `powerball explain` with its defaults. *Before* and *after* are errors on the validation logs in percent of each joint's torque, of the base model
 and with all that was found; the textbook fit has Coulomb, viscous and constant friction. PySINDy is what sparse regression leaves where it searches a textbook's residual for a law: all
 products of two of 1, sin q, cos q, velocities, accelerations and their signs of all joints (`benches/sindy.py`, with Pinocchio's regressor; a base model and
@@ -78,7 +78,7 @@ impl Logs {
         RigidArm::new(&self.arm).map_err(|e| e.to_string())
     }
 
-    /// What is said where the last logs judge.
+    /// What is reported where the last logs judge.
     fn explained(&self, fitted: usize) -> Result<Explained, String> {
         let (fit, validate) = self.logs.split_at(fitted);
         explain(&self.arm, fit, validate, &ExplainOptions::default()).map_err(|e| e.to_string())

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Logs of a folder, by file names without `.csv`, and what their owners say of them.
+/// Logs of a folder, by file names without `.csv`, and what their owners state about them.
 #[derive(Deserialize)]
 struct Question {
     folder: String,
@@ -100,7 +100,7 @@ fn differs(explained: &Explained) -> String {
             format!("{} {:.1}–{:.1} s", d.effect, d.start_time, d.end_time)
         };
         let list: Vec<String> = log.differs.iter().map(of).collect();
-        let what = if list.is_empty() { "not said".into() } else { list.join(", ") };
+        let what = if list.is_empty() { "not stated".into() } else { list.join(", ") };
         cells.push(format!("{}: {what}", log.log));
     }
     for effect in explained.effects.iter().filter(|e| e.effect == "payload") {
@@ -119,7 +119,7 @@ fn differs(explained: &Explained) -> String {
     if cells.is_empty() { "none".into() } else { cells.join("; ") }
 }
 
-/// What is said of all logs.
+/// What is reported about all logs.
 fn elsewhere(explained: &Explained) -> String {
     let all = explained.effects.iter().filter(|e| e.logs.is_empty());
     let of = |e: &powerball::explanation::explain::NamedEffect| {

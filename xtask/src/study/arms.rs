@@ -18,7 +18,7 @@ pub(super) const LARGEST_FACTOR: f64 = 4.0;
 /// An arm and a plant like it.
 pub(super) struct Drawn {
     pub(super) arm: Arm,
-    /// Its arm file.
+    /// The arm file.
     pub(super) text: String,
     pub(super) plant: Plant,
     /// Links whose plane x = 0 is declared a plane of symmetry, from 0.

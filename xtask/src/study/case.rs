@@ -20,7 +20,7 @@ pub(super) enum Table {
     Pairs,
     /// One effect where friction follows other laws than Eq. 16
     Friction,
-    /// One effect beside a smooth misfit of 0.3 σ on all joints
+    /// One effect in addition to a smooth misfit of 0.3 σ on all joints
     Misfit,
     /// No effect, white noise
     Clean,
@@ -34,7 +34,7 @@ pub(super) enum Table {
     Alike,
     /// An effect put into the measured logs of a UR10e, size 1
     Measured,
-    /// The same, size 0.6
+    /// An effect put into the measured logs of a UR10e, size 0.6
     MeasuredSmall,
     /// One effect on an arm that was drawn by lot
     Arms,
@@ -42,7 +42,7 @@ pub(super) enum Table {
     CleanArms,
     /// Two effects, half of them on one joint, on arms, friction, logs and sensors that were drawn by lot
     Drawn,
-    /// The same arms, friction, logs and sensors without an effect
+    /// Arms, friction, logs and sensors as of the drawn pairs, without an effect
     CleanDrawn,
 }
 
@@ -78,7 +78,9 @@ impl Table {
             Table::Small => "one effect of size 0.15 to 0.3, white noise",
             Table::Pairs => "two effects of sizes 0.3 to 1.5, white noise",
             Table::Friction => "one effect of size 0.3 to 1.5, friction of other laws",
-            Table::Misfit => "one effect of size 0.3 to 1.5 beside a smooth misfit of 0.3 σ on all joints",
+            Table::Misfit => {
+                "one effect of size 0.3 to 1.5 in addition to a smooth misfit of 0.3 σ on all joints"
+            }
             Table::Clean => "no effect, white noise",
             Table::Coloured => "no effect, coloured noise",
             Table::ColouredEffect => "one effect of size 0.3 to 1.5, coloured noise",

@@ -45,7 +45,7 @@ pub(super) struct Bench {
     drawn: Option<Drawn>,
 }
 
-/// What is in the plant beside what its model knows.
+/// What is in the plant in addition to what its model knows.
 #[derive(Clone, Debug)]
 enum Truth {
     Effect(Effect),
@@ -60,7 +60,7 @@ impl Truth {
         }
     }
 
-    /// Its joint, from 0, where it is of one alone.
+    /// The joint of the effect, from 0, where it is of one alone.
     fn joint(&self) -> Option<usize> {
         match self {
             Truth::Effect(effect) => match effect.joints()[..] {
@@ -111,7 +111,7 @@ struct Recorded {
 pub(super) struct Written {
     /// Each truth in words.
     pub(super) words: Vec<String>,
-    /// Its visible size.
+    /// The visible size of each truth.
     pub(super) sizes: Vec<f64>,
     /// Held-out errors without it, by joint, N·m.
     pub(super) clean: Vec<f64>,
@@ -297,8 +297,8 @@ impl Bench {
     }
 
     /// A truth of that kind and the size that it reached: visible size `size`, or at least that where it stays as it
-    /// was drawn. `None` where the arm has none. It sits on joint `on` where an arm that was drawn is told one and the
-    /// kind is of one joint.
+    /// was drawn. `None` where the arm has none. It sits on joint `on` where an arm that was drawn is given
+    /// one and the kind is of one joint.
     fn truth(
         &self,
         session: &Session,
@@ -338,7 +338,8 @@ impl Bench {
                 continue;
             }
             let (truth, reached, factor) = self.scaled(&quiet, truth, size, &plain)?;
-            // On an arm of any kind many a truth is a part of the base model, or next to nothing beside it.
+            // On an arm of any kind many a truth is a part of the base model, or next to nothing compared
+            // with it.
             if self.drawn.is_none() || ((0.8..1.25).contains(&(reached / size)) && factor < LARGEST_FACTOR) {
                 return Ok(Some((truth, reached)));
             }
@@ -398,7 +399,7 @@ impl Bench {
 }
 
 impl Session {
-    /// The same with nothing beside the plant that the model knows.
+    /// This session with nothing in addition to the plant that the model knows.
     fn alone(&self) -> Session {
         Session {
             plant: self.plant.clone(),
@@ -413,14 +414,14 @@ impl Session {
         }
     }
 
-    /// What is there beside the truths: zeros of torque sensors, which are called `asymmetry`.
+    /// What is there in addition to the truths: zeros of torque sensors, which are called `asymmetry`.
     fn known(&self, kinds: &[String]) -> Vec<Named> {
         const NAME: &str = "asymmetry";
         let off = (0..self.zeros.len()).filter(|joint| self.zeros[*joint] != 0.0);
         // Where it is a truth as well, one name says both.
         match kinds.iter().any(|kind| kind == NAME) {
             true => Vec::new(),
-            false => vec![Named::beside(NAME, off.map(|joint| joint + 1).collect())],
+            false => vec![Named::additional(NAME, off.map(|joint| joint + 1).collect())],
         }
     }
 

@@ -18,14 +18,14 @@ pub(super) struct Named {
     /// See [`NamedEffect::own_share`](powerball::explanation::explain::NamedEffect::own_share).
     #[serde(default)]
     pub(super) own_share: Option<f64>,
-    /// How probable it is said to be.
+    /// The stated probability.
     #[serde(default)]
     pub(super) probability: Option<f64>,
 }
 
 impl Named {
-    /// What is there beside the truths, on these joints, from 1.
-    pub(super) fn beside(effect: &str, joints: Vec<usize>) -> Named {
+    /// What is there in addition to the truths, on these joints, from 1.
+    pub(super) fn additional(effect: &str, joints: Vec<usize>) -> Named {
         let (effect, alike) = (effect.into(), Vec::new());
         Named {
             effect,
@@ -104,7 +104,7 @@ impl Outcome {
         }
     }
 
-    /// Whether the first name is what is there, or its class is told.
+    /// Whether the first name is what is there, or its class is reported.
     pub(super) fn first_right(&self) -> bool {
         self.named.first().is_some_and(|n| self.names_truth(n))
     }

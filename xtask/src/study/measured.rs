@@ -22,8 +22,8 @@ const HELD_OUT: [&str; 2] = ["5", "14"];
 /// The grid on which the motion is followed, s, and its smoothing, Hz.
 const STEP: f64 = 0.005;
 const SMOOTHING: f64 = 8.0;
-/// The same where a gear gives way: its way follows the torque, a second derivative, and is differentiated
-/// twice itself. The paths end well below.
+/// As [`SMOOTHING`], where a gear gives way: its way follows the torque, a second derivative, and is
+/// differentiated twice itself. The paths end well below.
 const SMOOTHING_OF_GEARS: f64 = 3.0;
 /// Rounds in which an effect is scaled to its size.
 const ROUNDS: usize = 3;

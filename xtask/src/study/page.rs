@@ -37,7 +37,7 @@ pub(super) fn tables(outcomes: &[Outcome]) -> String {
     if !stated.is_empty() {
         let _ = writeln!(
             out,
-            "\n### Whether names are right as often as is said\n\n{}",
+            "\n### Whether names are right as often as is stated\n\n{}",
             super::reliability::table(&stated)
         );
     }

@@ -81,7 +81,7 @@ fn line(outcome: &Outcome, named: &Named) -> Option<String> {
     ))
 }
 
-/// Its case and what the curve reads of it.
+/// The case of a line, and what the curve reads of it.
 fn case(line: &str) -> Option<(&str, Case)> {
     let cells: Vec<&str> = line.split(',').collect();
     let [name, _, right, margin, alike, _, leftover, ..] = cells[..] else { return None };
@@ -91,8 +91,8 @@ fn case(line: &str) -> Option<(&str, Case)> {
     Some((name, Case { evidence, features: evidence.features(), unattributed, right: right == "1" }))
 }
 
-/// The coefficients, and how the curve that they make does on names that were not fitted, beside three constants and
-/// beside one.
+/// The coefficients, and how the curve that they make does on names that were not fitted, compared with three
+/// constants and with one.
 fn curve(fit: &[Case], judge: &[Case]) -> String {
     let coefficients = fitted(fit);
     let mut out = format!("fitted to {} names: {coefficients:.3?}\n\n", fit.len());
@@ -151,7 +151,7 @@ fn fitted(cases: &[Case]) -> [f64; FEATURES] {
     coefficients
 }
 
-/// Names in order of what the curve says of them, in bins of equal size.
+/// Names in order of the curve's probability, in bins of equal size.
 fn reliability(cases: &[Case], curve: &dyn Fn(&Case) -> f64) -> String {
     let mut sorted: Vec<(f64, bool)> = cases.iter().map(|case| (curve(case), case.right)).collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));

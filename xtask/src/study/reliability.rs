@@ -4,10 +4,10 @@ use super::judge::Outcome;
 use std::fmt::Write as _;
 use std::ops::Range;
 
-/// Probabilities that are told apart.
+/// Bins of probabilities.
 const BINS: [Range<f64>; 4] = [0.0..0.6, 0.6..0.8, 0.8..0.93, 0.93..1.01];
 
-/// The reliability table: what was said against what was so.
+/// The reliability table: what was stated against what was true.
 pub(super) fn table(outcomes: &[&Outcome]) -> String {
     let mut out = String::from(
         "| probability that was stated, mean | names | right | 95 % interval |\n|---|---|---|---|\n",

@@ -10,14 +10,16 @@ fn names(table: Table, seed: u64) -> Vec<String> {
     outcome.named.into_iter().map(|named| named.effect).collect()
 }
 
-/// A base model that errs on a new path, here for the zeros of the torque sensors, shows no payload there.
+/// A base model that is wrong on a new path, here for the zeros of the torque sensors, shows no payload
+/// there.
 #[test]
-fn what_errs_on_a_new_path_is_no_payload() {
+fn an_error_on_a_new_path_is_no_payload() {
     let names = names(Table::CleanDrawn, 513);
     assert!(names.is_empty(), "{names:?}");
 }
 
-/// Once what else is there is known, a stiffness that was found beside a sensor's zero is needed no more.
+/// Once what else is there is known, a stiffness that was found in addition to a sensor's zero is needed no
+/// more.
 #[test]
 fn a_zero_is_no_spring() {
     let names = names(Table::Drawn, 515);

@@ -19,7 +19,7 @@ const FARTHEST: f64 = 0.3;
 /// A log with a change.
 pub(super) struct Changed {
     pub(super) log: Log,
-    /// The same without.
+    /// The log without the change.
     pub(super) clean: Log,
     /// When it begins, or the arm begins to move with it, s.
     pub(super) at: f64,
@@ -139,9 +139,9 @@ fn offset_of_size(plant: &Plant, motion: &Motion, joint: usize, size: f64) -> f6
         });
         moved.collect()
     };
-    let (at, beside) = (torques(0.0), torques(0.01));
+    let (at, next) = (torques(0.0), torques(0.01));
     let of = |j: usize| {
-        let change: f64 = at.iter().zip(&beside).map(|(a, b)| (a[j] - b[j]).powi(2)).sum();
+        let change: f64 = at.iter().zip(&next).map(|(a, b)| (a[j] - b[j]).powi(2)).sum();
         let whole: f64 = motion
             .samples()
             .zip(&at)

@@ -1,4 +1,4 @@
-//! What a watch says of measured logs, with models of other logs of the same arm.
+//! What a watch reports about measured logs, with models of other logs of the same arm.
 
 use super::{events, explained};
 use dyngen::Arm;

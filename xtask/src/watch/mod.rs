@@ -1,5 +1,5 @@
-//! How soon a watch sees a change and whether it names it right, how often it is wrong, and what it says of measured
-//! logs.
+//! How soon a watch sees a change and whether it names it right, how often it is wrong, and what it reports
+//! about measured logs.
 
 mod draw;
 mod measured;

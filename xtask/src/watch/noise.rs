@@ -50,8 +50,8 @@ impl Noise<'_> {
             for (j, shown) in row.iter_mut().enumerate() {
                 let Some(own) = &self.colour.joints[j] else { continue };
                 let e: f64 = StandardNormal.sample(&mut self.rng);
-                let told: f64 = own.coefficients.iter().zip(&past[j]).map(|(a, x)| a * x).sum();
-                let noise = told + own.deviation * e;
+                let predicted: f64 = own.coefficients.iter().zip(&past[j]).map(|(a, x)| a * x).sum();
+                let noise = predicted + own.deviation * e;
                 past[j].copy_within(..ORDER - 1, 1);
                 past[j][0] = noise;
                 if let Some(shown) = shown {

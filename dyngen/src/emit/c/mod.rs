@@ -1,4 +1,5 @@
-//! The same functions as C99: a source file and its header, from the statements that the file in Rust is printed from.
+//! Generated functions as C99: a source file and its header, from the statements that the file in Rust is
+//! printed from.
 
 mod friction;
 mod function;
@@ -53,7 +54,7 @@ pub fn c_files(model: &Model, options: &Options, header: &str) -> Result<CFiles,
     })
 }
 
-/// A thing in C: what the header says of it, and what stands in the source file.
+/// A thing in C: its declaration in the header, and its definition in the source file.
 struct Item {
     declaration: String,
     definition: String,

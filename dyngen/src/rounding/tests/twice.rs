@@ -1,4 +1,4 @@
-//! Numbers of two doubles: twice the digits (Dekker 1971), for what is exact beside a double.
+//! Numbers of two doubles: twice the digits (Dekker 1971), for what is exact compared with a double.
 
 use crate::exact::rational::{self, Rational, to_f64};
 use crate::graph::evaluate::Field;

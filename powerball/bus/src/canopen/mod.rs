@@ -30,6 +30,6 @@ pub use cob::{Cob, NodeId};
 pub use frame::Frame;
 pub use objects::Object;
 
-/// A point in time, or a span of it, in microseconds. Only differences matter; the core never asks a clock,
-/// it is told.
+/// A point in time, or a span of it, in microseconds. Only differences matter; the core never reads a clock,
+/// it is given the time.
 pub type Micros = u64;

@@ -8,7 +8,7 @@ use core::fmt;
 pub struct Entry {
     /// What is mapped.
     pub object: Object,
-    /// Its size in bits: 8, 16, 24 or 32 on this arm (granularity 8).
+    /// The object's size in bits: 8, 16, 24 or 32 on this arm (granularity 8).
     pub bits: u8,
 }
 
@@ -127,7 +127,7 @@ impl Mapping {
         self.entries().iter().any(|entry| entry.object == object)
     }
 
-    /// Bytes of a frame, each object's value asked of `value` and cut to its size (two's complement, little
+    /// Bytes of a frame, each object's value taken from `value` and cut to its size (two's complement, little
     /// endian). The length is [`Mapping::len`].
     pub fn pack(&self, mut value: impl FnMut(Object) -> i64) -> ([u8; 8], usize) {
         let (mut bytes, mut at) = ([0; 8], 0);

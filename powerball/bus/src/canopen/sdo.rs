@@ -39,7 +39,7 @@ impl fmt::Debug for Chunk {
 pub enum Transfer {
     /// All of it, one to four bytes, in this frame. A frame that says no size counts as four.
     Expedited(Chunk),
-    /// In segments that follow, of so many bytes where told.
+    /// In segments that follow, with the total number of bytes where it is given.
     Segmented(Option<u32>),
 }
 
@@ -50,7 +50,7 @@ pub enum Request {
     Download {
         /// What is written.
         object: Object,
-        /// Its value, or that segments follow.
+        /// The object's value, or that segments follow.
         transfer: Transfer,
     },
     /// The next bytes of a segmented write.
@@ -98,7 +98,7 @@ pub enum Response {
     Upload {
         /// What is read.
         object: Object,
-        /// Its value, or that segments follow.
+        /// The object's value, or that segments follow.
         transfer: Transfer,
     },
     /// The next bytes of a segmented read.

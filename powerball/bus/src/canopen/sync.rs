@@ -1,4 +1,5 @@
-//! SYNC and heartbeats in time: when to send, what was late, who is silent. Told the time, never asking it.
+//! SYNC and heartbeats in time: when to send, what was late, who is silent. It is given the time and never
+//! reads a clock.
 
 use super::Micros;
 use core::num::NonZeroU64;

@@ -327,7 +327,7 @@ mod tests {
 
     /// A peer tested quick stop with the mask of operation enabled, so that it could never be seen.
     #[test]
-    fn quick_stop_is_told_from_operation_enabled() {
+    fn quick_stop_is_distinguished_from_operation_enabled() {
         assert_eq!(Statusword(0x0007).state(), State::QuickStopActive);
         assert_eq!(Statusword(0x0027).state(), State::OperationEnabled);
     }

@@ -40,7 +40,8 @@ impl<const N: usize> Driver<N> {
             return;
         }
         let Some(missing) = self.joints.iter().position(|joint| joint.booted.is_none()) else {
-            // Nodes go there by themselves after their boot-up; some (python-canopen's) repeat it until they are told.
+            // Nodes go there by themselves after their boot-up; some (python-canopen's) repeat it until they
+            // are commanded.
             if self.manage(nmt::Command::EnterPreOperational, tx) {
                 self.enter_script(Phase::Identify, tx);
             }
@@ -432,8 +433,8 @@ impl<const N: usize> Driver<N> {
         }
     }
 
-    /// The drive's answer on whether its commutation search is done. Until it is, the joint is told to stay
-    /// where it is.
+    /// The drive's answer on whether its commutation search is done. Until it is, the joint is commanded to
+    /// stay where it is.
     pub(super) fn commutation_result(
         &mut self,
         j: usize,

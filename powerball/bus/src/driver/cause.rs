@@ -83,7 +83,7 @@ pub enum Cause {
     Interrupted,
     /// No heartbeat of a node in three of its periods.
     HeartbeatLost(NodeId),
-    /// No process data of a node in so many cycles.
+    /// No process data of a node for too many cycles.
     DataMissing(NodeId),
     /// A node restarted.
     Rebooted(NodeId),
@@ -107,11 +107,12 @@ pub enum Cause {
     Setpoints(Rejection),
     /// A drive with torque shows that it cannot use it; its statusword.
     Hindered(NodeId, Hindrance, Statusword),
-    /// A joint is not where it was told to be: following error beyond the drive's delay, and its limit, rad.
+    /// A joint is not where it was commanded to be: following error beyond the drive's delay, and its limit,
+    /// rad.
     FollowingError(NodeId, f64, f64),
-    /// A joint does not have the velocity that it was told: error and limit, rad/s.
+    /// A joint does not have the commanded velocity: error and limit, rad/s.
     VelocityError(NodeId, f64, f64),
-    /// A joint stands still so far from the target of its profile, rad.
+    /// A joint stands still at this distance from the target of its profile, rad.
     Stuck(NodeId, f64),
     /// A measured position jumped: by how much, and what its greatest velocity explains, rad.
     PositionJump(NodeId, f64, f64),
@@ -127,13 +128,14 @@ pub enum Cause {
     Overspeed(JointNumber, f64, f64),
     /// Current mode: velocities of a joint that no joint can have, one after the other; the last one, rad/s.
     ImplausibleVelocity(NodeId, JointNumber, f64),
-    /// Current mode: a joint's position is off its integrated velocity by so much, rad: one of the two is wrong.
+    /// Current mode: a joint's position is off its integrated velocity by this much, rad: one of the two is
+    /// wrong.
     PositionAgainstVelocity(NodeId, JointNumber, f64),
     /// Current mode: a joint's current is not the one that was asked for: measured and asked for, A.
     CurrentError(NodeId, JointNumber, f64, f64),
-    /// Current mode: so much of a joint's torque does not act as the model says, and what may be, N·m.
+    /// Current mode: this much of a joint's torque does not act as in the model, and what may be, N·m.
     TorqueError(NodeId, JointNumber, f64, f64),
-    /// Current mode: a joint is so far from where it should be, and how far it may be, rad.
+    /// Current mode: a joint is this far from where it should be, and how far it may be, rad.
     OffPath(NodeId, JointNumber, f64, f64),
     /// The CAN controller is off the bus.
     BusOff,
@@ -401,7 +403,7 @@ pub enum Refusal {
     NoMode(ControlMode),
     /// The mode was not verified on hardware, and the caller does not accept that.
     NotVerified(ControlMode),
-    /// The bus would be loaded by so much (1 is all of it) in the worst case.
+    /// The bus would be loaded by this much (1 is all of it) in the worst case.
     BusLoad(f64),
     /// The profile contradicts itself; what and where.
     Profile(&'static str),

@@ -31,8 +31,9 @@ impl<const N: usize> Driver<N> {
         checked
     }
 
-    /// The same in interpolated position mode with a torque (N·m) that each drive adds to its own from the next SYNC on:
-    /// feed-forward. It holds until the next one is given, and is 0 whenever the arm does not run.
+    /// As [`Self::set`], in interpolated position mode, with a torque (N·m) that each drive adds to its own
+    /// from the next SYNC on: feed-forward. It holds until the next one is given, and is 0 whenever the arm
+    /// does not run.
     ///
     /// # Errors
     /// As [`Driver::set`]; and where a torque is no number, more than the joint has, or further from the last one than
@@ -159,7 +160,7 @@ impl<const N: usize> Driver<N> {
             }
             joint.counters.missing += u64::from(judged);
             joint.missing_run = joint.missing_run.saturating_add(1);
-            // What is stopped already is told once.
+            // What is stopped already is reported once.
             let stopped = matches!(self.phase, Phase::Stopping | Phase::Faulted | Phase::Resetting);
             if judged && (joint.missing_run == limit || joint.missing_run > limit && !stopped) {
                 self.trip(Cause::DataMissing(self.node(j)), tx);

@@ -103,7 +103,7 @@ pub struct Entry {
     pub default: Option<i64>,
     /// Whether the node's number is added to the default.
     pub plus_node: bool,
-    /// Its name.
+    /// The object's name.
     pub name: &'static str,
 }
 
@@ -133,17 +133,17 @@ impl Entry {
         }
     }
 
-    /// The same, which can be in a PDO.
+    /// This entry, which can be in a PDO.
     pub const fn mapped(self) -> Entry {
         Entry { mappable: true, ..self }
     }
 
-    /// The same with its value after power-up.
+    /// This entry with its value after power-up.
     pub const fn default(self, value: i64) -> Entry {
         Entry { default: Some(value), ..self }
     }
 
-    /// The same with its value after power-up, to which the node's number is added.
+    /// This entry with its value after power-up, to which the node's number is added.
     pub const fn default_plus_node(self, value: i64) -> Entry {
         Entry { default: Some(value), plus_node: true, ..self }
     }

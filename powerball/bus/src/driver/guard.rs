@@ -166,7 +166,7 @@ mod tests {
         }
     }
 
-    /// Set-points that have gone by so much each cycle for a while, the last one at 0.1.
+    /// Set-points that have moved by `step` each cycle for a while, the last one at 0.1.
     fn run_up(step: f64) -> Demand {
         let mut demand = Demand::at_rest(0.1);
         (0..8).rev().for_each(|k| demand.push(0.1 - step * f64::from(k)));

@@ -1,6 +1,6 @@
-//! One joint while the driver runs: what its drive says, and what it is told.
+//! One joint while the driver runs: what its drive reports, and what it is commanded.
 //!
-//! Also here: what the driver asks of a transport, and what a transport tells it.
+//! Also here: what the driver requires of a transport, and what a transport reports to it.
 
 use super::profile::{JointProfile, ModeProfile};
 use super::script::Progress;
@@ -24,7 +24,7 @@ pub struct JointCounters {
     pub duplicates: u64,
     /// Frames of a wrong length.
     pub malformed: u64,
-    /// Emergencies, beyond the first of each kind not told one by one.
+    /// Emergencies, beyond the first of each kind not reported one by one.
     pub emergencies: u64,
     /// Velocities that no joint can have, in current mode: the one before was used in their place.
     pub implausible: u64,
@@ -53,11 +53,11 @@ pub struct Joint {
     pub device_type: Option<u32>,
     /// 0x1018: vendor, product, revision, serial number, as far as the drive tells them.
     pub identity: [Option<u32>; 4],
-    /// When its last process data came, on the clock that the driver is told, µs.
+    /// When its last process data came, on the driver's clock, µs.
     pub answered_at: Micros,
     /// Counts.
     pub counters: JointCounters,
-    /// Scales, with the rated current that the drive told.
+    /// Scales, with the rated current that the drive reported.
     pub units: JointUnits,
     /// mdeg/s of a count of 0x6042.
     pub(super) velocity_count: f64,
@@ -260,7 +260,7 @@ impl Joint {
     }
 }
 
-// What the driver asks of a transport, and what a transport tells it.
+// What the driver requires of a transport, and what a transport reports to it.
 
 /// The transport's queue holds no more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

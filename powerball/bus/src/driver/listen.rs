@@ -24,7 +24,7 @@ pub struct OtherMapping {
     pub node: NodeId,
     /// The number of its transmit PDO.
     pub number: u8,
-    /// Its bytes, and those of the mapping.
+    /// Bytes received, and bytes of the mapping.
     pub bytes: [usize; 2],
 }
 

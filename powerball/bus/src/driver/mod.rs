@@ -1,7 +1,7 @@
 //! The arm as one thing on its CAN bus: a CANopen master for CiA 402 drives, without clock, I/O or
 //! allocation.
 //!
-//! A [`Driver`] is told the time and given frames; it gives back frames ([`Transmit`]). What it must know of
+//! A [`Driver`] is given the time and frames; it gives back frames ([`Transmit`]). What it must know of
 //! the arm stands in a [`Profile`]. Set-points and measurements are in SI.
 //!
 //! ```text
@@ -44,7 +44,7 @@
 //! | torque offset NaN, beyond the joint's torque, jumping | before it leaves | as a set-point | 3 cycles |
 //! | no new set-point | in the slot | the last one held; 3 cycles in a row: stop, [`Cause::Starved`] (not in profile position) | 3 cycles |
 //! | velocities mean something else | way asked for and way gone, while the scale is not verified on hardware | stop, [`Cause::WrongVelocityScale`] | 0.1 rad |
-//! | joint not where or not as fast as told, stuck, jumping, beyond its limits, at its current limit | each cycle | stop, [`Cause::FollowingError`], [`Cause::VelocityError`], [`Cause::Stuck`], [`Cause::PositionJump`], [`Cause::PositionLimit`], [`Cause::TorqueLimit`] | [`profile::Reactions`] |
+//! | joint not where or not as fast as commanded, stuck, jumping, beyond its limits, at its current limit | each cycle | stop, [`Cause::FollowingError`], [`Cause::VelocityError`], [`Cause::Stuck`], [`Cause::PositionJump`], [`Cause::PositionLimit`], [`Cause::TorqueLimit`] | [`profile::Reactions`] |
 //! | current mode: a joint that does not move as its torque says, measurements that no joint can have | each cycle | stop, [`Cause::ImplausibleVelocity`], [`Cause::PositionAgainstVelocity`], [`Cause::CurrentError`], [`Cause::TorqueError`], [`Cause::OffPath`] | [`profile::TorqueMode`] |
 //! | voltage, remote, internal limit, interpolation, following error in the statusword | each statusword of a joint with torque | stop, [`Cause::Hindered`] | at once, 3 cycles |
 //! | the program is asked to end | the caller, by a signal | stop, [`Cause::Interrupted`] | at once |
@@ -195,7 +195,7 @@ pub struct Counters {
     pub unexpected: u64,
 }
 
-/// Something that was told, and when. Repeats of the last one are counted, not kept.
+/// Something that was reported, and when. Repeats of the last one are counted, not kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Note {
     /// When first.
@@ -417,7 +417,7 @@ impl<const N: usize> Driver<N> {
         self.restart
     }
 
-    /// What the drive that the cause is about told of its error, as far as it was read.
+    /// What the drive that the cause names reported about its error, as far as it was read.
     pub fn details(&self) -> &Details {
         &self.details
     }
@@ -442,12 +442,12 @@ impl<const N: usize> Driver<N> {
         &self.counters
     }
 
-    /// When the last SYNC left, on the clock that the driver is told, µs.
+    /// When the last SYNC left, on the driver's clock, µs.
     pub fn synced_at(&self) -> Micros {
         self.synced_at
     }
 
-    /// What was told, oldest first; the last 16.
+    /// What was reported, oldest first; the last 16.
     pub fn notes(&self) -> impl Iterator<Item = &Note> {
         let (newer, older) = self.notes.split_at(self.noted % NOTES);
         older.iter().chain(newer).flatten()

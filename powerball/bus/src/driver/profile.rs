@@ -18,7 +18,7 @@ pub struct ModeProfile {
     pub setpoint: Object,
     /// What the one receive PDO carries in this mode.
     pub rpdo: Mapping,
-    /// Bits of the controlword, beside "enable operation", while the joint follows set-points.
+    /// Bits of the controlword, in addition to "enable operation", while the joint follows set-points.
     pub running_bits: u16,
     /// Whether this was seen to work on the arm itself. What was not is refused unless the caller accepts it.
     pub verified_on_hardware: bool,
@@ -51,7 +51,7 @@ pub struct Identity {
 /// One joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointProfile {
-    /// Its drive.
+    /// The joint's drive.
     pub node: NodeId,
     /// What 0x1018 must say.
     pub identity: Identity,
@@ -63,7 +63,8 @@ pub struct JointProfile {
     pub velocity: f64,
     /// Greatest acceleration, rad/s².
     pub acceleration: f64,
-    /// Greatest torque, N·m: what a model may ask of the joint ([`super::TorqueGuard`]); infinite where it is not known.
+    /// Greatest torque, N·m: what a model may require of the joint ([`super::TorqueGuard`]); infinite where
+    /// it is not known.
     pub torque: f64,
     /// Greatest current, A.
     pub current: f64,
@@ -81,9 +82,9 @@ pub struct Reactions {
     pub missing_cycles: u8,
     /// A SYNC later than this part of the period counts as late.
     pub late_fraction: f64,
-    /// So many late SYNCs, without [`Reactions::forgiving_cycles`] good ones between them, stop the arm.
+    /// This many late SYNCs, without [`Reactions::forgiving_cycles`] good ones between them, stop the arm.
     pub late_limit: u8,
-    /// So many SYNCs in a row that could not be sent at all stop the arm.
+    /// This many SYNCs in a row that could not be sent at all stop the arm.
     pub skipped_limit: u64,
     /// Good cycles after which late ones and rejected set-points are forgotten.
     pub forgiving_cycles: u16,
@@ -92,16 +93,17 @@ pub struct Reactions {
     /// Consecutive cycles without a new set-point (once streaming began; not in profile position) that stop
     /// the arm.
     pub starved_cycles: u8,
-    /// Set-points may leave the limits by so much, rad.
+    /// Set-points may leave the limits by this much, rad.
     pub position_margin: f64,
-    /// A step of a position may be so many times v_max·T, to allow for rounding.
+    /// A step of a position may be this many times v_max·T, to allow for rounding.
     pub step_factor: f64,
     /// Greatest change of a current set-point in a cycle, as part of the joint's greatest current.
     pub current_step: f64,
     /// A joint measured faster than this times its greatest velocity, for [`Reactions::missing_cycles`] cycles,
     /// stops the arm.
     pub overspeed_factor: f64,
-    /// So much travel, rad, is asked for in velocity mode before it is compared with the travel that was gone.
+    /// This much travel, rad, is asked for in velocity mode before it is compared with the travel that was
+    /// gone.
     pub scale_travel: f64,
     /// Cycles in a row beyond [`JointProfile::following_error`] that stop the arm; their time is written to 0x6066
     /// where the drive has it.
@@ -114,15 +116,15 @@ pub struct Reactions {
     pub still_time: Micros,
     /// Cycles in a row with an internal limit, or without interpolation, that stop the arm.
     pub status_cycles: u8,
-    /// A position may jump by so much, rad, beside what the greatest velocity explains.
+    /// A position may jump by this much, rad, in addition to what the greatest velocity explains.
     pub jump_margin: f64,
-    /// A measured position may be so far beyond its limits, rad.
+    /// A measured position may be this far beyond its limits, rad.
     pub position_tolerance: f64,
     /// A current above this part of the greatest one …
     pub current_limit_part: f64,
-    /// … for so long stops the arm.
+    /// … for this long stops the arm.
     pub current_limit_time: Micros,
-    /// Nothing is sent for so long before the start, to hear whether another master is there.
+    /// Nothing is sent for this long before the start, to hear whether another master is there.
     pub listen_time: Micros,
     /// Cycles in a row in which process data of a node comes twice that stop the arm.
     pub duplicate_cycles: u8,
@@ -130,7 +132,7 @@ pub struct Reactions {
     pub boot_timeout: Micros,
     /// For an SDO answer.
     pub sdo_timeout: Micros,
-    /// Times that a silent SDO transfer is begun again.
+    /// Times that a silent SDO transfer is started again.
     pub sdo_retries: u8,
     /// For a transition of the drive's state machine, and for the mode to be shown.
     pub transition_timeout: Micros,
@@ -251,7 +253,7 @@ impl Reactions {
 /// An arm of `N` joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile<const N: usize> {
-    /// Its name.
+    /// The arm's name.
     pub name: &'static str,
     /// bit/s.
     pub bitrate: u32,
@@ -261,7 +263,7 @@ pub struct Profile<const N: usize> {
     pub master: NodeId,
     /// Period of the master's heartbeat, µs.
     pub master_heartbeat: Micros,
-    /// A drive that misses the master's heartbeat for so long reacts; 0x1016, ms.
+    /// A drive that misses the master's heartbeat for this long reacts; 0x1016, ms.
     pub master_watch_ms: u16,
     /// Cycles without a fresh interpolation point before a drive stops quickly; 0x200E, not 0. `None` for drives of
     /// another maker: 0x200E and the commutation search of 0x2050 are SCHUNK's, and neither is asked for then.
@@ -298,8 +300,8 @@ impl<const N: usize> Profile<N> {
         }
     }
 
-    /// The same with the drives' torque offset (0x60B2) in the receive PDO of interpolated position mode, for
-    /// [`Driver::set_with_torque`](super::Driver::set_with_torque): two bytes more a joint and cycle.
+    /// This profile with the drives' torque offset (0x60B2) in the receive PDO of interpolated position mode,
+    /// for [`Driver::set_with_torque`](super::Driver::set_with_torque): two bytes more a joint and cycle.
     #[must_use]
     pub const fn with_torque_offset(mut self) -> Self {
         if let Some(mode) = &mut self.interpolated_position {

@@ -186,7 +186,7 @@ impl<const N: usize> Driver<N> {
             let now = self.now;
             let Some(joint) = self.joints.get_mut(j) else { continue };
             if joint.heartbeat.is_lost(now) {
-                // Told once; it is watched again after a restart.
+                // Reported once; it is watched again after a restart.
                 joint.heartbeat.stop();
                 self.trip(Cause::HeartbeatLost(self.node(j)), tx);
             }
@@ -205,7 +205,7 @@ impl<const N: usize> Driver<N> {
         joint.emergency = Some(emcy);
         let cause = Cause::Emergency(node, emcy);
         match self.phase {
-            // Drives without motor power say so when they boot. Whether they can be used is asked of their
+            // Drives without motor power say so when they boot. Whether they can be used is read from their
             // state later.
             Phase::Boot | Phase::Identify | Phase::Configure | Phase::Verify if !repeated => self.note(cause),
             Phase::Starting | Phase::Ready | Phase::Enabling | Phase::Running => self.trip(cause, tx),
@@ -273,7 +273,7 @@ impl<const N: usize> Driver<N> {
             Some(Cob::Heartbeat(node)) if node == master => Foreign::Heartbeat(node),
             _ => return false,
         };
-        // What is stopped already is told once.
+        // What is stopped already is reported once.
         let known = matches!(self.phase, Phase::Stopping | Phase::Faulted | Phase::Resetting)
             && matches!(self.cause, Some(Cause::OtherMaster(_)));
         if !known {

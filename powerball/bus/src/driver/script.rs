@@ -185,7 +185,7 @@ pub(super) fn questions(mode: &ModeProfile, control: ControlMode) -> impl Iterat
 /// How far a joint is on its way to "operation enabled".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Progress {
-    /// Its turn has not come.
+    /// The joint's turn has not come.
     Waiting,
     /// Through the drive's states; in `state` until `deadline`.
     Walking { state: State, deadline: Micros },

@@ -88,7 +88,7 @@ impl<const N: usize> Driver<N> {
                 }
             }
             BusEvent::BusOff if self.phase != Phase::Idle => {
-                // Nothing more can be said to the arm; its drives miss the heartbeat and stop themselves.
+                // Nothing more can be sent to the arm; its drives miss the heartbeat and stop themselves.
                 tx.discard_queued();
                 self.latch(Cause::BusOff);
                 self.silent = true;

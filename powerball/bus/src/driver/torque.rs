@@ -1,6 +1,7 @@
-//! The torque that set-points ask of the joints, from a model of the arm: what no limit of one joint can see.
+//! The torque that set-points require of the joints, from a model of the arm: what no limit of one joint can
+//! see.
 //!
-//! Also here: what one joint was told last; how the joints are commanded.
+//! Also here: what one joint was commanded last; how the joints are commanded.
 
 use super::cause::Rejection;
 use super::joint::Joint;
@@ -28,7 +29,7 @@ impl<const N: usize> TorqueGuard<N> {
         TorqueGuard { model: inverse_dynamics, margin: 0.0 }
     }
 
-    /// The same where somebody pushes the arm in current mode, with up to this part of each joint's torque.
+    /// This guard where somebody pushes the arm in current mode, with up to this part of each joint's torque.
     #[must_use]
     pub const fn with_push(self, part: f64) -> Self {
         TorqueGuard { margin: part, ..self }
@@ -44,7 +45,7 @@ impl<const N: usize> TorqueGuard<N> {
         (self.model)(q, dq, ddq)
     }
 
-    /// Whether the joints have the torque that `setpoints` ask of them after those that have left.
+    /// Whether the joints have the torque that `setpoints` require of them after those that have left.
     ///
     /// Interpolated positions are looked at with the velocity and the acceleration of their differences, velocities
     /// with theirs where the joints are, targets of profile position at rest there: the drive plans the way. A current
@@ -90,10 +91,10 @@ impl<const N: usize> fmt::Debug for TorqueGuard<N> {
     }
 }
 
-// What one joint was told last: the set-points that have left, newest first.
+// What one joint was commanded last: the set-points that have left, newest first.
 
-/// So many set-points are kept. A drive follows its interpolation points some cycles late: the joint is where one
-/// of the last of them was.
+/// Number of set-points that are kept. A drive follows its interpolation points some cycles late: the joint
+/// is where one of the last of them was.
 pub(super) const KEPT: usize = 8;
 
 /// The set-points of one joint that have left, in rad, rad/s or A.

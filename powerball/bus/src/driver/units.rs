@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn nan_is_cut_to_zero_and_told() {
+    fn nan_is_cut_to_zero_and_reported() {
         assert_eq!(to_i32(f64::NAN), Saturated { value: 0, cut: true });
         assert_eq!(to_i32(f64::INFINITY), Saturated { value: i32::MAX, cut: true });
     }

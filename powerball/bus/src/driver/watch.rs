@@ -1,5 +1,6 @@
 //! The watch on what the joints do: following error, velocity error, standstill, jumps, limits, torque, and the
-//! bits of the statusword beside its state. The master watches always, whatever the drives watch themselves.
+//! bits of the statusword other than its state. The master watches always, whatever the drives watch
+//! themselves.
 
 use super::cause::Hindrance;
 use super::script::Progress;
@@ -25,7 +26,7 @@ pub(super) struct Watched {
     idle: u8,
     /// Interpolation was shown as active since the joint was released.
     interpolated: bool,
-    /// The warning bit was up, and was told.
+    /// The warning bit was set, and was reported.
     warned: bool,
     /// Since when the torque is at its limit.
     strained: Option<Micros>,
@@ -193,7 +194,7 @@ impl<const N: usize> Driver<N> {
         let limit = joint.current_limit.unwrap_or(profile.current);
         let strained =
             control != ControlMode::Current && joint.current.abs() >= reactions.current_limit_part * limit;
-        // A drive may work at its limit as long as the joint goes where it is told.
+        // A drive may work at its limit as long as the joint goes where it is commanded.
         let keeps_up = running
             && match control {
                 ControlMode::InterpolatedPosition => {

@@ -49,7 +49,7 @@ pub fn write(bus: &mut dyn Bus, node: NodeId, object: Object, value: Value) -> R
     write_within(bus, node, object, value, TIMEOUT)
 }
 
-/// The same with `timeout` µs for each answer.
+/// As [`write()`], with `timeout` µs for each answer.
 pub(super) fn write_within(
     bus: &mut dyn Bus,
     node: NodeId,

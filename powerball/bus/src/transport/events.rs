@@ -1,7 +1,8 @@
 //! A driver's events, for the program's event log (crate `tracing`): what changes, not what every cycle has.
 //!
-//! `error` where the arm is stopped by a cause, `warn` for what the driver notes and bears, `info` for its phases, `debug`
-//! for the state of each drive. Without a listener, and in a cycle without a change, this costs some comparisons.
+//! `error` where the arm is stopped by a cause, `warn` for what the driver notes and tolerates, `info` for
+//! its phases, `debug` for the state of each drive. Without a listener, and in a cycle without a change, this
+//! costs some comparisons.
 
 use crate::cia402::State;
 use crate::driver::{Cause, Driver, Note, Phase};

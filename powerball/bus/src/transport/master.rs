@@ -123,7 +123,8 @@ impl<B: Bus, const N: usize> Master<B, N> {
         }
     }
 
-    /// The same with a second process that stops the arm where this one dies. It is dismissed once the arm rests.
+    /// This master with a second process that stops the arm where this one dies. It is dismissed once the arm
+    /// rests.
     #[cfg(unix)]
     #[must_use]
     pub fn with_watchdog(mut self, watchdog: Watchdog) -> Self {
@@ -131,7 +132,7 @@ impl<B: Bus, const N: usize> Master<B, N> {
         self
     }
 
-    /// The same, stopped by signals: the stop leaves within 10 ms of one.
+    /// This master, stopped by signals: the stop leaves within 10 ms of one.
     #[must_use]
     pub fn with_interrupt(mut self, interrupt: Interrupt) -> Self {
         interrupt.guard(true);

@@ -196,7 +196,8 @@ mod tests {
         assert!(bus.takes(other));
     }
 
-    /// By any interface's name that this machine can multicast on, both ways; a name that it has not is told.
+    /// By any interface's name that this machine can multicast on, both ways; a name that it does not have is
+    /// reported.
     #[cfg(target_os = "linux")]
     #[test]
     fn an_interface_is_found_by_its_name() {

@@ -38,7 +38,7 @@ impl fmt::Display for Interface {
     }
 }
 
-/// bit/s of a serial adapter that is told no other: what the LWA 4P's drives have.
+/// bit/s of a serial adapter where no other is given: what the LWA 4P's drives have.
 const BITRATE: u32 = 500_000;
 /// Longest name of an interface: IFNAMSIZ less its zero.
 const NAME: usize = 15;
@@ -101,8 +101,8 @@ fn port_of(text: &str) -> Result<(PathBuf, u32), String> {
     if path.is_empty() {
         return Err("the serial device is missing".to_string());
     }
-    let told = option.strip_prefix("bitrate=").and_then(|bitrate| bitrate.parse().ok());
-    let bitrate = told.ok_or("behind ? slcan takes bitrate= and a number in bit/s")?;
+    let bitrate = option.strip_prefix("bitrate=").and_then(|bitrate| bitrate.parse().ok());
+    let bitrate = bitrate.ok_or("behind ? slcan takes bitrate= and a number in bit/s")?;
     slcan::speed(bitrate)?;
     Ok((PathBuf::from(path), bitrate))
 }
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn what_names_no_bus_is_told_what_does() {
+    fn what_names_no_bus_is_answered_with_what_does() {
         for text in [
             "",
             "can0",

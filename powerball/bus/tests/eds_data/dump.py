@@ -1,4 +1,4 @@
-"""What python-canopen reads of the EDS files of this folder, as JSON beside them.
+"""What python-canopen reads of the EDS files of this folder, as JSON next to them.
 
     pip install canopen==2.4.1 && python dump.py
 

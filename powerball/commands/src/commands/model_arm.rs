@@ -14,7 +14,7 @@ use powerball_explanation::torque_model::{JointColour, LogChanges, ModelFile, Mo
 use rand::{RngExt, SeedableRng};
 use std::path::Path;
 
-/// External torque is noise up to so many standard deviations.
+/// External torque is noise up to this many standard deviations.
 const DEVIATIONS: f64 = 6.0;
 /// Random poses at which gains are judged.
 const POSES: usize = 300;
@@ -34,7 +34,7 @@ pub fn read(arm: &Arm, file: &Path, effects: bool) -> Result<ModelArm, String> {
     ModelOnArm::new(arm, &ModelFile::read(file).map_err(|e| e.to_string())?, effects)
 }
 
-/// What the model says of a path on an arm that has been working for `running` s.
+/// What the model predicts for a path on an arm that has been working for `running` s.
 ///
 /// # Errors
 /// Where the path takes more torque than a joint has, in words.

@@ -29,7 +29,7 @@ impl Cleared {
 
 /// What the motions of an arm of `N` joints must keep.
 pub struct Envelope<const N: usize> {
-    /// Why the arm must not go along a motion, beside the limits of its joints.
+    /// Why the arm must not go along a motion, in addition to the limits of its joints.
     barred: Barred,
     torque: Option<TorqueGuard<N>>,
 }
@@ -41,13 +41,14 @@ impl<const N: usize> fmt::Debug for Envelope<N> {
 }
 
 impl<const N: usize> Envelope<N> {
-    /// Whatever `barred` says of a motion, and nothing of torques: for arms whose surroundings are known otherwise.
+    /// What `barred` returns for a motion, and no check of torques: for arms whose surroundings are known
+    /// otherwise.
     pub fn new(barred: impl Fn(&Motion) -> Option<String> + 'static) -> Envelope<N> {
         Envelope { barred: Box::new(barred), torque: None }
     }
 
-    /// An arm in a mounting: its links as capsules, the floor (as [`surroundings`] has it where nothing is said) and
-    /// the torques of `masses`, which are guessed from the capsules where they are not given.
+    /// An arm in a mounting: its links as capsules, the floor (as [`surroundings`] has it where none is
+    /// given) and the torques of `masses`, which are guessed from the capsules where they are not given.
     ///
     /// The torque model stays in memory until the program ends, as a driver may guard its set-points with it.
     ///
@@ -136,7 +137,7 @@ impl<const N: usize> Envelope<N> {
 }
 
 /// The motion as the drives get it: positions, and the velocities and accelerations of their differences, whatever
-/// stands beside them in its file.
+/// stands next to them in its file.
 fn as_sent(motion: &Motion) -> Motion {
     let (n, period) = (motion.dof(), motion.period);
     let q = |k: usize, j: usize| motion.q[k * n + j];
@@ -186,7 +187,7 @@ mod tests {
 
     /// Each barrier alone: the arm itself, the floor, the torque, the joints' limits.
     #[test]
-    fn each_barrier_is_told_before_the_arm_moves() {
+    fn each_barrier_is_reported_before_the_arm_moves() {
         let open = envelope(None, 0.0);
         let refused = |envelope: &Envelope<6>, motion: &Motion| match envelope.check(&LWA4P, motion) {
             Err(e) => e.to_string(),
@@ -205,7 +206,8 @@ mod tests {
         assert!(matches!(open.check(&LWA4P, &far), Err(RecordError::Motion(_))));
     }
 
-    /// What a trajectory's file says beside its positions is no matter: the drives get the positions.
+    /// What a trajectory's file holds in addition to its positions does not matter: the drives get the
+    /// positions.
     #[test]
     fn velocities_of_a_file_are_not_believed() {
         let mut motion = way(&LWA4P, &[0.0, 1.7, 0.0, 0.0, 0.0, 0.0], &[0.0; 6], 0.9, 1.0);

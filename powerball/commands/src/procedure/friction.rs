@@ -53,7 +53,7 @@ pub enum FrictionError {
     #[error("{0}")]
     Log(LogError),
     /// A log holds too few plateaus.
-    #[error("{}: fewer than five velocities can be told from this log: delete it and record the joint again", .0.display())]
+    #[error("{}: fewer than five velocities can be determined from this log: delete it and record the joint again", .0.display())]
     TooLittle(PathBuf),
 }
 

@@ -10,12 +10,12 @@ pub struct Point {
     pub velocity: f64,
     /// Mean torque, N·m, positive in the direction of positive velocity.
     pub torque: f64,
-    /// Its standard error, N·m.
+    /// Standard error of the torque, N·m.
     pub error: f64,
 }
 
 /// A friction law: levels that are not negative times functions of the velocity with shapes, and a constant
-/// torque beside them.
+/// torque in addition to them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrictionLaw {
     /// Eq. 16: γ1·tanh(γ2·v) + γ3·tanh(γ4·v) + γ5·v.
@@ -24,7 +24,7 @@ pub enum FrictionLaw {
     CoulombViscous,
     /// F_c·sign v + ΔF·exp(−(v/v_s)²)·sign v + F_v·v.
     Stribeck,
-    /// The same with exp(−|v/v_s|^δ): five parameters.
+    /// `Stribeck` with exp(−|v/v_s|^δ): five parameters.
     StribeckPower,
 }
 
@@ -33,8 +33,8 @@ const GRID: usize = 13;
 const FINER: usize = 5;
 /// Later rounds, each half as wide as the one before: shapes to about 1e-3, where curves no longer differ.
 const ROUNDS: usize = 9;
-/// Two held-out errors closer than this share of their spread are not told apart; the law that comes first is
-/// taken.
+/// Two held-out errors closer than this share of their spread are not distinguished; the law that comes first
+/// is taken.
 const ALIKE: f64 = 1.0;
 
 impl FrictionLaw {
@@ -43,7 +43,7 @@ impl FrictionLaw {
     pub const ALL: [FrictionLaw; 4] =
         [FrictionLaw::Tanh, FrictionLaw::CoulombViscous, FrictionLaw::Stribeck, FrictionLaw::StribeckPower];
 
-    /// Its name in results.
+    /// The law's name in results.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -153,11 +153,11 @@ fn grid(ranges: &[(f64, f64)], count: usize) -> Vec<Vec<f64>> {
 pub struct Fitted {
     /// Which law.
     pub law: FrictionLaw,
-    /// Its shapes, in the order of its formula.
+    /// The law's shapes, in the order of its formula.
     pub shapes: Vec<f64>,
-    /// Its levels: N·m, N·m, N·m·s/rad.
+    /// The law's levels: N·m, N·m, N·m·s/rad.
     pub levels: [f64; 3],
-    /// A constant torque beside the friction, N·m: what gravity is left, or what differs between the
+    /// A constant torque in addition to the friction, N·m: what gravity is left, or what differs between the
     /// directions.
     pub offset: f64,
     /// χ² of the fit.
@@ -208,7 +208,7 @@ impl Rated {
 }
 
 /// Every law fitted and rated by leaving velocities out, and the index of the one that is chosen: the least
-/// held-out error, or the first one whose error is not told apart from it. `None` with fewer than five
+/// held-out error, or the first one whose error is not distinguished from it. `None` with fewer than five
 /// different velocities.
 #[must_use]
 pub fn choose(points: &[Point]) -> Option<(Vec<Rated>, usize)> {

@@ -1,4 +1,4 @@
-//! What a line of a recording says of its cycle.
+//! What a line of a recording states about its cycle.
 //!
 //! Also here: what a person reads while the arm moves; lines written by a thread of their own.
 
@@ -12,7 +12,8 @@ use std::path::Path;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
-/// The time of a log: so many s at the first of its SYNCs, and from there on what the bus's clock measures.
+/// The time of a log: a given value, s, at the first of its SYNCs, and from there on what the bus's clock
+/// measures.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LogTime {
     start: f64,
@@ -38,9 +39,10 @@ impl LogTime {
 pub enum Columns {
     /// `t`, `q1…qn` (rad) and `tau1…taun` (N·m).
     Torques,
-    /// Besides, all that was told and heard: `ref1…refn`, the set-points (rad); `dq1…dqn`, as the drives tell it
-    /// (rad/s); `status1…statusn`, the statuswords; `answer1…answern`, from SYNC to the joint's data (s); and `late`,
-    /// `skipped`, `dropped`, how many SYNCs and set-points were so since the recording began.
+    /// In addition, all that was sent and received: `ref1…refn`, the set-points (rad); `dq1…dqn`, as the
+    /// drives tell it (rad/s); `status1…statusn`, the statuswords; `answer1…answern`, from SYNC to the
+    /// joint's data (s); and `late`, `skipped`, `dropped`, how many SYNCs and set-points were so since the
+    /// recording began.
     Everything,
 }
 
@@ -155,7 +157,7 @@ impl Drop for MotionLog {
     }
 }
 
-// What a person is told while the arm moves.
+// What is shown to a person while the arm moves.
 
 /// How far a motion has come.
 #[derive(Clone, Debug, PartialEq)]
@@ -224,8 +226,8 @@ impl<W: Write + Send + 'static> Behind<W> {
         done
     }
 
-    /// Waits until everything is written, and gives the writer back, where its thread lived, beside the error that
-    /// ended it.
+    /// Waits until everything is written, and gives the writer back, where its thread lived, together with
+    /// the error that ended it.
     pub fn close(mut self) -> (Option<W>, io::Result<()>) {
         let done = self.finish();
         (self.done.take(), done)
@@ -267,7 +269,7 @@ mod behind_tests {
         assert_eq!(String::from_utf8(written.unwrap()).unwrap(), expected);
     }
 
-    /// Takes so many bytes, then the disk is full.
+    /// Takes this many bytes, then the disk is full.
     struct Full(usize);
 
     impl Write for Full {
@@ -281,7 +283,7 @@ mod behind_tests {
     }
 
     #[test]
-    fn a_full_disk_is_told() {
+    fn a_full_disk_is_reported() {
         let mut log = Behind::new(Full(10));
         let reported = (0..100_000).find_map(|_| log.write_all(b"1234\n").err()).unwrap();
         assert_eq!(reported.kind(), io::ErrorKind::StorageFull);

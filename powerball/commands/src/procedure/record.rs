@@ -292,7 +292,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         self.finish_with_envelope().map(|(master, _)| master)
     }
 
-    /// The same; gives back what motions must keep as well.
+    /// As [`Self::finish`]; gives back what motions must keep as well.
     pub(super) fn finish_with_envelope(mut self) -> Result<(Master<B, N>, Envelope<N>), RecordError> {
         self.master.stop()?;
         Ok((self.master, self.envelope))
@@ -340,7 +340,7 @@ pub fn record<B: Bus, const N: usize>(
     }
     recorder.release()?;
     let done = recorder.approach_and_record(&cleared, log);
-    // Also where the recording failed, the arm is stopped; why it failed is what is told.
+    // Also where the recording failed, the arm is stopped; the reported error is why it failed.
     let stopped = recorder.finish();
     let done = done?;
     stopped?;

@@ -184,7 +184,7 @@ mod tests {
         assert!(exponential(&warming(4, 0.0, 1)).is_none());
     }
 
-    /// Warm is said late enough: what is left to change is then below the tolerance, whatever the noise.
+    /// Warm is reported late enough: what is left to change is then below the tolerance, whatever the noise.
     #[test]
     fn an_arm_is_called_warm_when_it_is() {
         for (noise, seed) in [(0.0, 1), (0.01, 2), (0.05, 3)] {

@@ -18,7 +18,7 @@ const PATIENCE: u64 = 60_000_000;
 /// Share of the driver's limits that is used: rounding must not make a set-point one that it rejects.
 const WITHIN: f64 = 0.999;
 
-/// So long before the set-points leave a law is asked with what has come, µs.
+/// This long before the set-points leave, a law is evaluated with what has come, µs.
 const LEAD: u64 = 300;
 
 /// What a law asks for.
@@ -57,7 +57,7 @@ pub struct TorqueLoop<B: Bus, const N: usize> {
     limiter: Limiter<f64, N>,
     /// The last torque that was sent, and the one before.
     sent: [SVector<f64, N>; 2],
-    begun: u64,
+    first_cycle: u64,
     carried_on: u64,
 }
 
@@ -89,7 +89,14 @@ impl<B: Bus, const N: usize> TorqueLoop<B, N> {
             )));
         }
         let limiter = limits(master.driver().profile(), &constants);
-        Ok(TorqueLoop { master, constants, limiter, sent: [SVector::zeros(); 2], begun: 0, carried_on: 0 })
+        Ok(TorqueLoop {
+            master,
+            constants,
+            limiter,
+            sent: [SVector::zeros(); 2],
+            first_cycle: 0,
+            carried_on: 0,
+        })
     }
 
     /// Gives the driver a model of the arm for its guard of current mode.
@@ -121,10 +128,10 @@ impl<B: Bus, const N: usize> TorqueLoop<B, N> {
     ) -> Result<(), RecordError> {
         self.master.driver_mut().enable().map_err(ArmError::from)?;
         self.master.wait_for(Phase::Running, PATIENCE)?;
-        self.begun = self.master.driver().counters().cycles;
+        self.first_cycle = self.master.driver().counters().cycles;
         let period = self.master.driver().profile().period_seconds();
         // The last cycle that was served.
-        let mut done = self.begun;
+        let mut done = self.first_cycle;
         loop {
             let cycle = self.master.driver().counters().cycles;
             let due = self.master.driver().setpoints_due().filter(|_| cycle > done);
@@ -146,7 +153,8 @@ impl<B: Bus, const N: usize> TorqueLoop<B, N> {
             let is_carried_on = missed.iter().any(|missed| *missed > 0);
             self.carried_on += u64::from(is_carried_on);
             let state = State { q: q.into(), dq: dq.into() };
-            let measured = Measured { cycle: now_in - self.begun, state, is_carried_on, acted: self.sent[1] };
+            let measured =
+                Measured { cycle: now_in - self.first_cycle, state, is_carried_on, acted: self.sent[1] };
             let asked: Option<Asked<N>> = law(&measured).map(Into::into);
             if let Some(log) = log.as_deref_mut().filter(|_| !is_carried_on) {
                 let should = asked.and_then(|asked| asked.tracking).map_or(q, |tracking| tracking.position);

@@ -30,7 +30,7 @@ impl Default for Settings {
 /// What was seen of a joint.
 #[derive(Clone, Debug)]
 pub struct JointWarmth {
-    /// Its cycles.
+    /// The joint's cycles.
     pub cycles: Vec<Cycle>,
     /// The exponential of Fig. 3, where there are cycles enough.
     pub curve: Option<Exponential>,
@@ -175,7 +175,7 @@ impl<W: Write> Write for Lines<'_, W> {
 }
 
 /// Swings until every joint is warm, or the time is over. The log gets every cycle, t running on from
-/// `start`, which is 0 where a log begins; `seen` is what an earlier part of it showed. `progress` is told
+/// `start`, which is 0 where a log begins; `seen` is what an earlier part of it showed. `progress` is given
 /// the time and the greatest change that may still be to come. The log is written in the cycle: hand over a
 /// [`Behind`](super::Behind) where it is a file.
 ///

@@ -83,7 +83,7 @@ fn distances(trajectory: &Trajectory) -> Option<Figure> {
     Some(Figure::new("Room", "time [s]").panel(panel))
 }
 
-/// One JSON object of all that is told; the list `trajectories` where there are several.
+/// One JSON object of all that is reported; the list `trajectories` where there are several.
 #[must_use]
 pub fn json(excited: &Excited) -> Value {
     let figures = |f: &Figures| json!({"condition": f.condition, "least_singular_value": f.least, "mean_singular_value": f.mean});

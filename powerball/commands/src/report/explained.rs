@@ -72,7 +72,7 @@ const WORDS: [(&str, &str); 12] = [
         "evidence",
         "The gain of the name over that of the next best name. Near 1 these logs cannot tell the two apart.",
     ),
-    ("left over", "The share of what the base model errs beyond noise that is still there with all effects."),
+    ("left over", "The share of the base model's error beyond noise that is still there with all effects."),
     ("noise floor", "What white noise of the measurement alone would leave, in the band of the fit."),
     (
         "band",
@@ -172,7 +172,7 @@ pub fn change(change: &Change) -> String {
     format!("{clear} ({} to {})", percent(low), percent(high))
 }
 
-/// What is said where no effect was named: never more than the logs show.
+/// What is reported where no effect was named: never more than the logs show.
 #[must_use]
 pub fn nothing_named(explained: &Explained) -> &'static str {
     if !explained.laws.is_empty() {
@@ -369,7 +369,7 @@ fn rest(page: &mut Page, explained: &Explained) {
     ));
 }
 
-/// What was found in the logs and the arm file; what is said of several logs alike is said once.
+/// What was found in the logs and the arm file; a note that is the same for several logs is written once.
 fn notes(page: &mut Page, explained: &Explained) {
     if explained.warnings.is_empty() {
         return;

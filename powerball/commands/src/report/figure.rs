@@ -15,9 +15,9 @@ const PANEL: f64 = 150.0;
 const BETWEEN: f64 = 14.0;
 const BELOW: f64 = 40.0;
 const LEGEND_LINE: f64 = 18.0;
-/// Points of a cloud beyond this number are not told apart by eye.
+/// Points of a cloud beyond this number are not distinguished by eye.
 pub(super) const MOST_POINTS: usize = 2_500;
-/// So few are drawn large.
+/// At most this many are drawn large.
 const FEW_POINTS: usize = 200;
 
 /// The colour of a curve, after the Okabe–Ito palette, which colour-blind readers can distinguish, each with a lighter twin

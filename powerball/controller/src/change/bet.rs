@@ -3,21 +3,21 @@
 use super::{GAIN, Innovation, LOSS, WINDOW};
 use nalgebra::{RealField, SMatrix, SVector};
 
-/// The size is held to zero as by so many usual samples without a change.
+/// The size is held to zero as by this many usual samples without a change.
 const HELD: f64 = 10.0;
-/// What is usual is that of so many samples …
+/// What is usual is computed over this many samples …
 const USUAL: f64 = 3000.0;
-/// … and is held to zero as by so many.
+/// … and is held to zero as by this many.
 const USUALLY: f64 = 1000.0;
 /// What a bet may lose at most of its capital.
 const MOST: f64 = 0.9;
 /// Capital beyond this is not counted: it fits into single precision, and the alarm is far below.
 const RICH: f64 = 1e25;
 
-/// What one joint says to a bet.
+/// What one joint contributes to a bet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Term<T, const P: usize> {
-    /// Its innovation.
+    /// The joint's innovation.
     pub innovation: Innovation<T>,
     /// The change's columns through the joint's colour, over σ.
     pub columns: [T; P],
@@ -101,12 +101,12 @@ impl<T: RealField + Copy, const P: usize> Bet<T, P> {
         solved(self.information + self.usual * self.held(HELD), &self.score)
     }
 
-    /// The size that is usual: what the model errs along the change's columns for long is no change.
+    /// The size that is usual: a lasting model error along the change's columns is no change.
     pub(super) fn usual_size(&self) -> SVector<T, P> {
         solved(self.usual * (T::one() + self.held(USUALLY)), &self.usual_score)
     }
 
-    /// So many usual samples as a share of those that were seen.
+    /// `samples` usual samples as a share of those that were seen.
     fn held(&self, samples: f64) -> T {
         nalgebra::convert::<f64, T>(samples) / self.samples.max(T::one())
     }

@@ -1,9 +1,9 @@
-//! What a joint shows that could not be told from its past.
+//! What a joint shows that could not be predicted from its past.
 
 use super::{FOLLOWED, GAIN, LEAST_MARGIN, ORDER, SLIP};
 use nalgebra::RealField;
 
-/// The colour of a joint's residual, and what its model errs.
+/// The colour of a joint's residual, and its model's error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Colour<T> {
     /// a_1 … of r(t) = Σ a_k·r(t−k) + e(t).

@@ -39,8 +39,8 @@ impl Noise {
             Law::Heavy => 0.7 * normal[0],
             Law::Normal | Law::Common => normal[0],
         };
-        let told: f64 = COLOUR.coefficients.iter().zip(&self.past).map(|(a, x)| a * x).sum();
-        let r = told + COLOUR.deviation * e;
+        let predicted: f64 = COLOUR.coefficients.iter().zip(&self.past).map(|(a, x)| a * x).sum();
+        let r = predicted + COLOUR.deviation * e;
         self.past.copy_within(..ORDER - 1, 1);
         self.past[0] = r;
         r

@@ -273,7 +273,8 @@ fn is_single<T: 'static>() -> bool {
 /// sin(x + ahead·π/2) with operations of single precision alone, within 1.2·10⁻⁷ up to 800 rad, and beyond to what x is
 /// known to.
 fn wave<T: RealField + Copy>(x: T, ahead: T) -> T {
-    // π/2 in parts of 15, 15 and 24 bits: products of the first two with so many turns are exact (Cody and Waite).
+    // π/2 in parts of 15, 15 and 24 bits: products of the first two with the number of turns are exact (Cody
+    // and Waite).
     const PARTS: [f64; 3] = [1.570_800_781_25, -4.454_515_874_385_834e-6, 6.077_100_628_276_71e-11];
     // Taylor's series of sin r − r and cos r − 1, interpolated for |r| ≤ π/4.
     const SINE: [f64; 4] = [

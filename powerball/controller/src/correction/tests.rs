@@ -1,4 +1,4 @@
-//! The laws against what they are said to be.
+//! The laws against their documentation.
 
 use super::*;
 
@@ -143,7 +143,7 @@ fn a_joint_that_is_not_there_does_nothing() {
     assert_eq!(torque, [1.0, 2.0]);
 }
 
-/// What is said to be the same on every joint is; what depends on the joint's own motion is not.
+/// What is documented as the same on every joint is; what depends on the joint's own motion is not.
 #[test]
 fn laws_that_are_alike_on_all_joints_have_one_value() {
     let (q, dq, ddq) = ([0.3, -0.7, 1.1], [0.5, -0.2, 0.9], [1.0, 2.0, -3.0]);

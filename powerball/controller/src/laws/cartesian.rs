@@ -9,9 +9,10 @@ use nalgebra::{Matrix3, Matrix4, Matrix6, RealField, SMatrix, SVector, Vector3, 
 pub struct Goal<T> {
     /// Pose of the tool's frame, m.
     pub pose: Matrix4<T>,
-    /// Its twist, m/s above rad/s.
+    /// Twist of the frame, m/s above rad/s.
     pub twist: Vector6<T>,
-    /// Its acceleration, m/s² above rad/s²; `None` for the passive form, which a fixed or slow goal wants.
+    /// Acceleration of the frame, m/s² above rad/s²; `None` for the passive form, which a fixed or slow goal
+    /// wants.
     pub acceleration: Option<Vector6<T>>,
 }
 

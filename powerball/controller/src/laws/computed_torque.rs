@@ -78,7 +78,7 @@ impl<T: RealField + Copy, const N: usize> Integrator<T, N> {
         Integrator { gain, bound, held: SVector::zeros() }
     }
 
-    /// Its torque, N·m.
+    /// The integrator's torque, N·m.
     #[must_use]
     pub fn torque(&self) -> &SVector<T, N> {
         &self.held

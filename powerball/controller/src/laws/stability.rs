@@ -3,7 +3,8 @@
 use super::number;
 use nalgebra::{RealField, SMatrix};
 
-/// So many squarings: the 65 536th power of the loop tells its largest pole to 2·10⁻⁴ whatever its eigenvectors are.
+/// Number of squarings: the 65 536th power of the loop tells its largest pole to 2·10⁻⁴ whatever its
+/// eigenvectors are.
 const SQUARINGS: i32 = 16;
 
 /// The largest pole of a loop in absolute value; it is stable below 1.

@@ -7,7 +7,7 @@ use powerball_controller::correction::Law;
 use serde::Serialize;
 
 /// A link that friction holds is not felt while the motor crosses the gap; a free one flies through it where
-/// its load turns; one that is loaded slowly stands beside the motor by half the gap.
+/// its load turns; one that is loaded slowly is off from the motor by half the gap.
 pub(super) struct Backlash;
 
 /// What of the backlash shows.
@@ -127,7 +127,7 @@ impl Effect for Backlash {
     }
 }
 
-/// Every so many samples are enough for an average.
+/// For an average, one sample out of this many is enough.
 const SPARSE: usize = 16;
 
 /// The diagonal element of the mass matrix on the average over the logs, kg·m² or kg.

@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// that its products with the tilt are columns of their own ([`Settings::unshown`]).
 pub(super) struct BaseTilt;
 
-/// What is fitted beside the tilt.
+/// What is fitted in addition to the tilt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// Whether the parameters that level gravity does not show are fitted too
@@ -127,7 +127,7 @@ fn pulled(context: &Context<'_>, gravity: &[f64; 3], all: &[f64]) -> Option<Colu
 }
 
 /// What all parameters gain where the unshown ones' torques are those found: under the whole tilt they are
-/// those of so much of each direction.
+/// the ones of a given amount of each direction.
 fn moments(context: &Context<'_>, tilt: &[f64], found: &[f64]) -> Vec<f64> {
     let gravity_unobservable = context.data.body.gravity_unobservable();
     let turns = turns(context);

@@ -22,7 +22,7 @@ pub struct Settings {
 pub struct Figures {
     /// The parameters' names.
     pub parameters: Vec<String>,
-    /// Their values, SI units.
+    /// The parameters' values, SI units.
     pub values: Vec<f64>,
 }
 

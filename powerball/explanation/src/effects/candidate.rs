@@ -46,7 +46,7 @@ impl Window {
 /// An effect on some joints with the settings of its search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// Its joints, at least one.
+    /// The joints it acts on, at least one.
     pub joints: Vec<JointNumber>,
     /// What of its law is no coefficient, and so of which effect it is.
     pub settings: Settings,
@@ -69,7 +69,7 @@ impl Candidate {
         Candidate { joints, settings: settings.into(), windows: Vec::new(), searched: searched as f64 }
     }
 
-    /// The same with other settings.
+    /// This candidate with other settings.
     #[must_use]
     pub fn with(&self, settings: impl Into<Settings>) -> Candidate {
         Candidate { settings: settings.into(), ..self.clone() }
@@ -110,7 +110,7 @@ pub(super) fn geometric(low: f64, high: f64, count: usize) -> Vec<f64> {
     (0..count).map(|k| low * (high / low).powf(k as f64 / last)).collect()
 }
 
-/// A setting near another one: that share of the way to so many times it.
+/// A setting near another one: `share` of the way from `setting` to `factor` times `setting`.
 #[must_use]
 pub(super) fn scaled(setting: f64, factor: f64, share: f64) -> f64 {
     setting + share * (setting * factor - setting)
@@ -123,13 +123,13 @@ pub(super) fn scaled(setting: f64, factor: f64, share: f64) -> f64 {
 pub enum Axis {
     /// A joint's position.
     Position(JointNumber),
-    /// The place within a cycle of the joint's own position, with so many cycles a turn.
+    /// The place within a cycle of the joint's own position, with this many cycles a turn.
     Cycle(f64),
     /// A joint's velocity.
     Velocity(JointNumber),
-    /// The torque that the rigid arm asks of the joint.
+    /// The torque that the rigid arm requires at the joint.
     Torque,
-    /// Its size, where the residual is taken against the direction of motion.
+    /// The size of that torque, where the residual is taken against the direction of motion.
     Load,
     /// How far the joint has come since it turned back, up to several times this way, rad or m; the residual
     /// is taken against the direction of motion.

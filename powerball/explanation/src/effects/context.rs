@@ -45,13 +45,13 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// The same where columns are wanted and nothing else: what the model leaves is not known.
+    /// As [`Context::new`], for columns alone: what the model leaves is not known.
     #[must_use]
     pub fn for_columns(data: &'a Data<'a>, fit: &'a Fit, rule: &'a Rule) -> Context<'a> {
         Context::new(data, fit, &[], rule)
     }
 
-    /// The same model on the same data, where something else is left.
+    /// This model on the same data, with another residual.
     #[must_use]
     pub(crate) fn seen_with<'b>(&'b self, residual: &'b [Vec<f64>]) -> Context<'b> {
         let of_model = Arc::clone(&self.of_model);
@@ -230,10 +230,10 @@ const MOVED: f64 = 1e-4;
 /// A compliant joint's deflection is smoothed to this before it is differentiated twice, Hz: torques are
 /// noisy derivatives already.
 const STIFF: f64 = 5.0;
-/// The same where it is as large as was found: above the frequency at which a soft arm swings on its gear the
-/// deflection is not what its load says.
+/// As [`STIFF`], for a compliance as large as was found: above the frequency at which a soft arm swings on
+/// its gear the deflection is not what its load says.
 pub(crate) const SOFT: f64 = 2.0;
-/// A link that gives way far carries another load there: the load is taken so many times.
+/// A link that gives way far carries another load there: the load is computed this many times.
 pub(crate) const PASSES: usize = 2;
 /// The load whose side a link hangs to is smoothed to this, Hz: going through the play is an impulse in the
 /// rigid torque of the motor's motion, and would change the side that it follows from.

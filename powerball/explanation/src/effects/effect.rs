@@ -1,4 +1,4 @@
-//! What is asked of an effect.
+//! What an effect must provide.
 
 use super::{Axis, Candidate, Context, Figures, Found, Window};
 use crate::rule::Rule;
@@ -50,9 +50,9 @@ pub enum Part {
     Gravity([f64; 3], Vec<f64>),
     /// A body that a link may carry (the last one where none is named): mass in kg and centre in m, in its frame.
     Payload(f64, [f64; 3], Option<JointNumber>),
-    /// Logs whose position of the candidate's joints is so many rad above the true one.
+    /// Logs whose position of the candidate's joints is this much above the true one, rad.
     EncoderOffset(f64),
-    /// Logs whose torque of the candidate's joints is so many s late.
+    /// Logs whose torque of the candidate's joints is late by this much, s.
     Delay(f64),
     /// Nothing that lasts.
     Event,
@@ -60,24 +60,24 @@ pub enum Part {
 
 /// A physical term that a model may lack.
 ///
-/// A candidate that is given to an effect is one of its own; of another effect's candidate nothing is said
+/// A candidate that is given to an effect is one of its own; for another effect's candidate it gives nothing
 /// (no columns, no laws, nothing near it).
 pub trait Effect: Sync {
     // What it is.
 
-    /// Its name in results.
+    /// The effect's name in results.
     fn name(&self) -> &'static str;
 
     /// What it is easily confused with.
     fn class(&self) -> Class;
 
     /// Whether its name says what it is. What has none is looked for only where nothing with a name passes,
-    /// and is told as a formula.
+    /// and is reported as a formula.
     fn has_name(&self) -> bool {
         true
     }
 
-    /// Whether the instants at which it sets in are known only roughly, so that nothing can be said of its
+    /// Whether the instants at which it sets in are known only roughly, so that nothing is known of its
     /// fast part.
     fn abrupt(&self) -> bool {
         self.class() == Class::Event
@@ -166,8 +166,8 @@ pub trait Effect: Sync {
         true
     }
 
-    /// Whether a model may have it with such coefficients, beside all that it has: friction that warmth changes stays
-    /// friction.
+    /// Whether a model may have it with these coefficients, in addition to all others: friction that warmth
+    /// changes stays friction.
     fn possible(&self, _context: &Context<'_>, _candidate: &Candidate, _coefficients: &[f64]) -> bool {
         true
     }
@@ -177,7 +177,7 @@ pub trait Effect: Sync {
         None
     }
 
-    // What is said of it once it is accepted.
+    // What is reported about it once it is accepted.
 
     /// When the context's logs have it: its windows, and where it goes on in logs that were not fitted.
     fn windows(&self, _context: &Context<'_>, candidate: &Candidate) -> Vec<Window> {

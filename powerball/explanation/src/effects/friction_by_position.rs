@@ -47,7 +47,7 @@ impl Figures {
     }
 }
 
-/// Cycles a turn that are tried: of a higher one nobody has said that friction has it.
+/// Cycles a turn that are tried: no higher one has been reported for friction.
 const ORDERS: [f64; 2] = [1.0, 2.0];
 
 impl Effect for FrictionByPosition {

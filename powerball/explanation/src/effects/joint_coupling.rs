@@ -113,11 +113,11 @@ pub struct Transmission {
     pub with: JointNumber,
     /// How far it turns with that one.
     pub ratio: f64,
-    /// Its Coulomb friction, N·m.
+    /// Coulomb friction of the transmission, N·m.
     pub coulomb: f64,
-    /// Its viscous friction, N·m·s/rad.
+    /// Viscous friction of the transmission, N·m·s/rad.
     pub viscous: f64,
-    /// Its rotor's inertia beyond that of the arm file's rotors, at the joint, kg·m².
+    /// Inertia of the rotor beyond that of the arm file's rotors, at the joint, kg·m².
     pub inertia: f64,
     /// The block for the arm file.
     pub arm_file: String,
@@ -291,7 +291,7 @@ fn block(motor: JointNumber, with: JointNumber, ratio: &str) -> String {
     format!("[[transmission]]\njoints = [{first}, {second}]\nmatrix = {matrix}")
 }
 
-/// Ratios of up to so many teeth are tried for the arm file.
+/// Ratios of up to this many teeth are tried for the arm file.
 const MOST_TEETH: u32 = 12;
 /// A ratio that is found this near to one of teeth is that one.
 const SAME_RATIO: f64 = 0.04;

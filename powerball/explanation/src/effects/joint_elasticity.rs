@@ -58,7 +58,7 @@ impl Effect for JointElasticity {
         vec![context.moved_link_column(candidate.joints[0], Law::Compliance, *about)]
     }
 
-    /// A soft gear moves its link so far that gravity there is another one.
+    /// A soft gear moves its link far enough to change gravity there.
     fn refined(&self, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
         (c[0] > 0.0).then(|| candidate.with(Settings { about: Some(c[0]) }))
     }

@@ -13,12 +13,12 @@ const MASS: usize = 3;
 /// … and the inertia across the direction of the first moment.
 pub(super) const INERTIA: usize = 4;
 
-/// What columns say of a body.
+/// What columns determine of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Body {
     /// First moment about the link's joint in the link's frame, kg·m.
     pub moment: Vector3<f64>,
-    /// Its mass, kg, and its centre in the link's frame, m, as a point of that moment and inertia.
+    /// Mass, kg, and centre in the link's frame, m, as a point of that moment and inertia.
     pub mass: f64,
     pub centre: Vector3<f64>,
     /// Whether the mass itself shows. It does not where the link's joint does not move in space. Then it follows from

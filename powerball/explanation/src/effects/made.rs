@@ -14,7 +14,7 @@ const MOST: usize = 96 << 20;
 /// What is kept at most of one model, bytes.
 const MOST_OF_MODEL: usize = 32 << 20;
 /// Models of which something is kept: the one that is searched with, the one before it, and those that are
-/// tried beside it.
+/// tried next to it.
 const MODELS: usize = 3;
 
 /// What was made of one data set.

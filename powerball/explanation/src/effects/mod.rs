@@ -2,7 +2,7 @@
 //!
 //! **What an effect may know** is its [`Context`]: the logs as rows, the model fitted so far, what that
 //! model leaves, and the thresholds of the rule. It knows nothing of other effects, of the search or of
-//! results. What those must know of an effect they ask of [`Effect`], never by its name.
+//! results. What those must know of an effect they get from [`Effect`], never from its name.
 //!
 //! **How a log row becomes a column**: [`Effect::columns`] takes the logs of a context and gives, for each
 //! coefficient of a [`Candidate`], one value for each row of the regression. Where the effect is a torque of
@@ -50,7 +50,7 @@ pub(crate) use windows::mask;
 /// Makes of the list of effects what must know all of them: [`Settings`], [`Figures`] and [`all`].
 macro_rules! library {
     ($($module:ident::$Effect:ident),* $(,)?) => {
-        /// The settings of a candidate, which also say of which effect it is.
+        /// The settings of a candidate, which also determine the effect it belongs to.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Settings {
             $(#[doc = concat!("Of [`", stringify!($module), "`].")] $Effect($module::Settings),)*
@@ -91,7 +91,7 @@ macro_rules! library {
             }
 
             impl $module::Settings {
-                /// Those of a candidate of this effect; `None` of another one's.
+                /// The settings of a candidate of this effect; `None` for another effect's.
                 #[must_use]
                 pub fn of(candidate: &Candidate) -> Option<&Self> {
                     match &candidate.settings {

@@ -34,24 +34,25 @@ pub struct Settings {
 /// What it is.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
-    /// Its centre in the frame of its link, m; nothing where only its first moment shows.
+    /// Centre of the body in the frame of its link, m; nothing where only its first moment shows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub com: Option<[f64; 3]>,
-    /// The same in the link's own frame, m: that of its robot description where the arm file has it, else that of the
-    /// table.
+    /// Centre of the body in the link's own frame, m: that of its robot description where the arm file has
+    /// it, else that of the table.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub com_in_link: Option<[f64; 3]>,
     /// Until when, one for each log that has it, in the log's own t, s: null where it stays to the end; nothing
     /// where it does in all.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub end_time: Vec<Option<f64>>,
-    /// Its first moment about the joint of its link, in the link's frame, kg·m; nothing on the last link.
+    /// First moment of the body about the joint of its link, in the link's frame, kg·m; nothing on the last
+    /// link.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_moment: Option<[f64; 3]>,
     /// The link that carries it, where it is not the last.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<JointNumber>,
-    /// Its mass, kg; nothing where only its first moment shows.
+    /// Mass of the body, kg; nothing where only its first moment shows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mass: Option<f64>,
     /// From when on, one for each log that has it, in the log's own t, s.
@@ -86,9 +87,10 @@ impl Figures {
 const GRID: f64 = 0.5;
 /// … whose ends are then looked for on a grid of this, s …
 const FINE: f64 = 0.1;
-/// … at least so many of them where it is taken up and put down again, 8 s: what is there for less is a push …
+/// … at least this many of them where it is taken up and put down again, 8 s: what is there for less is a
+/// push …
 const SHORTEST: usize = 16;
-/// … so many where the log ends with it, and twice as many where the log begins with it and does not.
+/// … this many where the log ends with it, and twice as many where the log begins with it and does not.
 const LEAST: usize = 4;
 /// Parts of a log at which it is picked up and put down are looked for first.
 const COARSE: usize = 24;
@@ -316,7 +318,7 @@ fn search(context: &Context<'_>, link: Option<usize>) -> Option<Candidate> {
     Some(Candidate { joints, settings, windows, searched: held.searched })
 }
 
-/// Whether a run of steps of so many seconds can be a body that is held.
+/// Whether a run of steps of `step` seconds can be a body that is held.
 fn long_enough(run: &Range<usize>, log: &Range<usize>, step: f64) -> bool {
     let least = match [run.start == log.start, run.end == log.end] {
         [_, true] => LEAST,
@@ -377,8 +379,8 @@ impl Search {
         self.coefficients = self.found.gain().1;
     }
 
-    /// The run of a log that explains most beside what was found: on a coarse grid first, then its ends are
-    /// moved. A body is held to the end of a log rather than put down shortly before.
+    /// The run of a log that explains most in addition to what was found: on a coarse grid first, then its
+    /// ends are moved. A body is held to the end of a log rather than put down shortly before.
     fn best(&mut self, log: &Range<usize>) -> (f64, Range<usize>) {
         let coarse = log.len().div_ceil(COARSE).max(1);
         let mut best = (0.0, log.clone());
@@ -411,7 +413,7 @@ impl Search {
     }
 
     /// The windows of runs of steps, with their ends moved by at most a step each: the body is known now, so
-    /// that a row more or less can be told.
+    /// that a row more or less makes a difference.
     fn windows(
         &self,
         context: &Context<'_>,

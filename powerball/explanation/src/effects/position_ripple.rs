@@ -171,7 +171,7 @@ fn scan(context: &Context<'_>, joint: usize) -> Vec<f64> {
 
 /// A joint's torque by order: Σ τ·e^(−i·k·q) over samples.
 pub(crate) struct Spectrum {
-    /// Its values, up to the order of half a cycle a bin of position.
+    /// The spectrum's values, up to the order of half a cycle a bin of position.
     pub(crate) values: Vec<Complex<f64>>,
     step: f64,
 }

@@ -25,7 +25,7 @@ pub struct Settings {
 pub enum Friction {
     /// All of Eq. 16.
     Whole,
-    /// Its viscous part.
+    /// The viscous part of Eq. 16.
     Viscous,
 }
 

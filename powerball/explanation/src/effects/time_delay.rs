@@ -52,7 +52,7 @@ impl Effect for TimeDelay {
         Axis::TorqueRate
     }
 
-    /// The same path is run early or late alike.
+    /// `false`: one path may be run early or late.
     fn is_function_of_path(&self, _: &Candidate, _: &Data<'_>, _: &Rule) -> bool {
         false
     }

@@ -72,7 +72,7 @@ pub struct Formula {
     pub joint: JointNumber,
     /// As text: `tau2 = c1·q2·q3 + …`, N·m.
     pub formula: String,
-    /// The same for LaTeX.
+    /// The formula for LaTeX.
     pub latex: String,
     /// The unit of each coefficient.
     pub units: Vec<&'static str>,

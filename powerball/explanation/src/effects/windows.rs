@@ -55,8 +55,8 @@ pub(super) fn window(
     Some(Window::new(data, steps[found.start].log, from, to))
 }
 
-/// The same of what is there before a log begins where it is there at its first step, and goes on after it
-/// where it is there at its last.
+/// As [`window`], for what is there before a log begins where it is there at its first step, and goes on
+/// after it where it is there at its last.
 pub(super) fn lasting_window(
     context: &Context<'_>,
     steps: &[Block],

@@ -5,7 +5,7 @@
 //! (Vuong, Likelihood ratio tests for model selection and non-nested hypotheses, Econometrica 1989, with
 //! blocks in the place of samples).
 //!
-//! Also here: the log of an experiment beside those that were there before.
+//! Also here: the log of an experiment together with the earlier ones.
 
 use crate::explain::{Hypothesis, Open};
 use crate::options::{ExplainError, ExplainOptions};
@@ -140,7 +140,7 @@ fn difference(data: &Data<'_>, a: &Hypothesis, b: &Hypothesis) -> f64 {
     if least > 0.0 { (apart / least).sqrt() } else { f64::INFINITY }
 }
 
-// The log of an experiment beside those that were there before.
+// The log of an experiment together with the earlier ones.
 
 /// The share of a new log, its end, that is held out.
 pub const HELD_OUT: f64 = 0.35;

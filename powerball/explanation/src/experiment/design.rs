@@ -22,7 +22,7 @@ pub struct DesignedExperiment {
     pub motion: Motion,
     /// rms of the difference that would stay, over the residual's own rms, by joint.
     pub expected: Vec<f64>,
-    /// The same over the whole path, all joints together: χ² by which the wrong name would fall behind.
+    /// Evidence over the whole path, all joints together: χ² by which the wrong name would fall behind.
     pub evidence: f64,
     /// How much better the path tells what only one of the names has than the old logs.
     pub narrows: f64,
@@ -70,7 +70,7 @@ pub fn design(body: &RigidArm, open: &Open, options: &DataOptions) -> Result<Des
     })
 }
 
-/// One name true, the other one fitted: what the old logs say of it.
+/// One name true, the other one fitted: what the old logs show about it.
 struct Duel<'o> {
     truth: usize,
     rival: usize,
@@ -92,9 +92,9 @@ struct Signal {
     stays: f64,
 }
 
-/// The old logs leave a coefficient open by so many standard deviations.
+/// The old logs leave a coefficient open by this many standard deviations.
 const OPEN: f64 = 2.0;
-/// A coefficient that is known so much better already counts no more.
+/// A coefficient that is already known this much better no longer counts.
 const ENOUGH: f64 = 20.0;
 
 fn duels(open: &Open) -> Vec<Duel<'_>> {

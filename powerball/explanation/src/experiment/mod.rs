@@ -14,7 +14,7 @@ use powerball_logs::log::Log;
 use powerball_logs::motion::Motion;
 use powerball_logs::regression::RigidArm;
 
-/// Name of the trajectory's file beside explained.json.
+/// Name of the trajectory's file next to explained.json.
 pub const TRAJECTORY: &str = "next_experiment.csv";
 
 /// Designs the experiment for what an explanation leaves open, and says so in its `next_experiment`; `None`

@@ -24,7 +24,7 @@ use std::f64::consts::{LN_2, TAU};
 
 /// Ripples of a joint, at most.
 const MOST: usize = 4;
-/// Below this height no surrogate is asked: chance reaches it among so many orders.
+/// Below this height no surrogate is computed: among all these orders chance reaches it.
 const LOWEST: f64 = 8.0;
 
 /// Finds the ripples and takes them into the model. Returns the step that names them, if any.
@@ -231,7 +231,7 @@ fn high_passed(band: &Band, signal: &[f64]) -> Vec<f64> {
     signal.iter().zip(band.filtered(signal)).map(|(x, low)| x - low).collect()
 }
 
-/// Velocities are sorted into so many, for the frequencies at which an order passes.
+/// Velocities are sorted into this many bins, for the frequencies at which an order passes.
 const VELOCITIES: usize = 200;
 
 /// How often a joint moves at which velocity.
@@ -272,7 +272,7 @@ const HIGHEST: f64 = 0.8 * BINS as f64 / 2.0;
 /// The order that stands out most.
 pub(super) struct Peak {
     pub(super) order: f64,
-    /// Its power over that of noise around it: where there is noise alone, P(height > h) = e^(−h).
+    /// Power of the order over that of noise around it: where there is noise alone, P(height > h) = e^(−h).
     pub(super) height: f64,
 }
 
@@ -360,7 +360,8 @@ impl Wave {
         if square > 0.0 { (2.0 * self.product(traces) - own) / square } else { 0.0 }
     }
 
-    /// The same where other logs have it with the same phase: more than noise gives with probability `level`.
+    /// As [`Self::gain`], where other logs have it with the same phase: more than noise gives with
+    /// probability `level`.
     pub(super) fn gain_on(&self, traces: &[Trace], level: f64) -> Option<f64> {
         let above = Velocities::of(traces).above(traces, self.order);
         let deviation = (0.5 * self.power() * noise_around(traces, self.order) * above).sqrt();
@@ -410,7 +411,7 @@ fn noise_around(traces: &[Trace], order: f64) -> f64 {
 }
 
 /// Orders on either side that say what noise gives, how far the first is and how far they are apart: a path of
-/// four radians tells two orders apart that differ so much.
+/// four radians distinguishes two orders that differ by that much.
 const NEIGHBOURS: usize = 20;
 const FIRST: f64 = 4.0;
 pub(super) const APART: f64 = 1.5;

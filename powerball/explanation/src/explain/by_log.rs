@@ -1,7 +1,7 @@
 //! What is another in one log than in the others: friction, a zero, a gain, a delay.
 //!
-//! All logs are taken, fitted or for validation, under one model. What all of them share falls out: a model that errs in
-//! all of them alike makes none odd.
+//! All logs, fitted or for validation, are taken under one model. What all of them share falls out: a model
+//! that is equally wrong in all of them makes none odd.
 
 use super::model::Model;
 use super::study::Study;
@@ -39,9 +39,9 @@ struct Tried {
     columns: [Column; SIDES],
 }
 
-/// At most so many are looked for in a log, all logs together.
+/// At most this many are looked for in a log, all logs together.
 const MOST_A_LOG: usize = 3;
-/// With so many other logs, a coefficient must be this many times as far from theirs as they are spread.
+/// With this many other logs, a coefficient must be this many times as far from theirs as they are spread.
 const OTHERS: usize = 3;
 const FAR: f64 = 3.0;
 
@@ -193,16 +193,16 @@ pub(crate) struct Together<'s> {
     pub(crate) data: [&'s Data<'s>; SIDES],
     /// What it leaves, by side, joint and row, N·m.
     pub(crate) residual: [Signals; SIDES],
-    /// Its coefficients.
+    /// The model's coefficients.
     pub(crate) theta: Vec<f64>,
     designs: [Design; SIDES],
     solver: Solver,
     weights: Vec<f64>,
 }
 
-/// What a column of one log explains beside the model.
+/// What a column of one log explains in addition to the model.
 pub(crate) struct Asked {
-    /// Its coefficient.
+    /// The column's coefficient.
     pub(crate) theta: f64,
     /// χ² explained.
     pub(crate) gain: f64,
@@ -254,7 +254,7 @@ impl<'s> Together<'s> {
         self.solve(side, log, column).map(|(theta, gain, _)| (theta, gain))
     }
 
-    /// The same, with the column itself.
+    /// As [`Self::screen`], with the column itself.
     pub(crate) fn ask(&self, side: usize, log: usize, column: &Column) -> Option<Asked> {
         let (theta, gain, base) = self.solve(side, log, column)?;
         let mut freed: [Signals; SIDES] = [0, 1].map(|s: usize| {

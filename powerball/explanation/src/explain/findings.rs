@@ -30,9 +30,9 @@ impl<'a> Findings<'a> {
     }
 
     /// These findings where what they took out of the validation set is needed there, else those of the set as it was
-    /// logged. A base model that lacks something errs on a path of its own as if a body were there or a hand pushed; once
-    /// that something is in the model no body is needed. What is needed leaves little of what the other model errs more
-    /// than on its fitted logs.
+    /// logged. A base model that lacks something is wrong on a path of its own as if a body were there or a
+    /// hand pushed; once that something is in the model no body is needed. What is needed leaves little of
+    /// the error that the other model has more than on its fitted logs.
     pub(super) fn or_as_logged(self, logged: Findings<'a>) -> Findings<'a> {
         let sigma = &logged.model.fit.sigma;
         let joints: BTreeSet<usize> = self

@@ -9,7 +9,7 @@
 //! |---|---|
 //! | `study` | the rows and the options: what does not change while effects are looked for |
 //! | `model` | what was accepted, and the fit with it: what does |
-//! | `named` | what is said of an effect |
+//! | `named` | what is reported about an effect |
 //! | `search` | candidates screened and tested; settings refined; backward elimination |
 //! | `comparison` | **whether a name is given**, what stays open, what is taken back |
 //! | `above_band` | ripple that is too fast for the band of the fit, by a test of its own |
@@ -97,7 +97,7 @@ fn find(Prepared { study, base, initial_fit }: Prepared<'_>) -> Findings<'_> {
                 study.say(&format!("step {}: what fits best fits no better than by chance", number + 1));
                 model.given_up.extend(candidates);
             }
-            // Only now is it known what is left beside all that fits.
+            // Only now is it known what is left after all that fits.
             Outcome::Nothing => {
                 if let Some(taken) = withhold(&study, &mut model, &mut history) {
                     study.say(&format!("{} is not named: {}", taken.effect.name(), taken.why));

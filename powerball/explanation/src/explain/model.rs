@@ -40,7 +40,8 @@ pub(super) struct Model {
     pub(super) given_up: Vec<Candidate>,
     /// The base model with all of it, fitted.
     pub(super) fit: Fit,
-    /// Which of what was accepted makes the error on the logs to judge on larger, once that is asked of this fit.
+    /// Which of what was accepted makes the error on the logs to judge on larger, once that is evaluated on
+    /// this fit.
     pub(super) harmful: OnceLock<Option<usize>>,
 }
 
@@ -71,7 +72,7 @@ impl Accepted {
         }
     }
 
-    /// Its coefficients where they were measured above the band of the fit.
+    /// The coefficients, where they were measured above the band of the fit.
     pub(super) fn above_band(&self) -> Option<&[f64]> {
         match &self.origin {
             Origin::AboveBand { coefficients, .. } => Some(coefficients),

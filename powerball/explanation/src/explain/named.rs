@@ -1,4 +1,4 @@
-//! What is said of an effect.
+//! What is reported about an effect.
 
 use crate::effects::Figures;
 use crate::effects::words::Words;
@@ -18,11 +18,11 @@ pub struct FitErrors {
 /// An effect with its evidence.
 #[derive(Clone, Debug, Serialize)]
 pub struct NamedEffect {
-    /// Its name.
+    /// The effect's name.
     pub effect: String,
-    /// Its joints.
+    /// The joints it acts on.
     pub joints: Vec<JointNumber>,
-    /// Its physical reading, SI units.
+    /// The physical values, SI units.
     #[serde(rename = "parameters")]
     pub figures: Figures,
     /// The standard error of its size on each joint, a share of it; null where it is not of the fit.
@@ -40,7 +40,7 @@ pub struct NamedEffect {
     pub logs: Vec<String>,
     /// How often a name with such evidence is right ([`Evidence`](super::Evidence), docs/study.md).
     pub probability: f64,
-    /// Its penalised gain over that of the next best name on the same joints.
+    /// The name's penalised gain over that of the next best name on the same joints.
     pub margin: f64,
     /// Share of the residual's excess over the noise floor that stays on its joints after all effects.
     pub leftover: f64,
@@ -59,7 +59,8 @@ impl NamedEffect {
         self.effect == name && self.joints.iter().any(|joint| joints.contains(joint))
     }
 
-    /// Its size in words; `sliding` says of each joint of the arm whether it slides, so that its torques are forces.
+    /// The effect's size in words; `sliding`: for each joint of the arm, whether it slides, so that its
+    /// torques are forces.
     #[must_use]
     pub fn size(&self, sliding: &[bool]) -> String {
         let first = self.joints.first().and_then(|joint| sliding.get(joint.index()));

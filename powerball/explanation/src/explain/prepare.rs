@@ -17,9 +17,9 @@ use powerball_logs::summary::BANDS;
 /// Whose inertial parameters are fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Inertia {
-    /// Those of one multibody model, to all joints together: the joint fit.
+    /// The parameters of one multibody model, fitted to all joints together: the joint fit.
     Shared,
-    /// Those of each joint by itself: the per-joint fit.
+    /// The parameters of each joint by itself: the per-joint fit.
     PerJoint,
 }
 
@@ -40,7 +40,7 @@ pub(super) struct Prepared<'a> {
     pub(super) initial_fit: InitialFit,
 }
 
-/// What the result says of the time before the search.
+/// What the result reports about the time before the search.
 pub(super) struct InitialFit {
     /// Errors of the base model.
     pub(super) errors: FitErrors,

@@ -224,7 +224,7 @@ fn drop_words_for(study: &Study<'_>, model: &mut Model, number: usize) {
     }
 }
 
-/// The same for all laws, once their settings are what fits best.
+/// As [`drop_words_for`], for all laws, once their settings are what fits best.
 pub(super) fn drop_words(study: &Study<'_>, model: &mut Model) {
     let law = |a: &Accepted| a.step().filter(|_| !a.effect().has_name());
     let steps: Vec<usize> = model.accepted.iter().filter_map(law).collect();

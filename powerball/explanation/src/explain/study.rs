@@ -6,26 +6,26 @@ use crate::rule::Rule;
 use powerball_identification::estimate::{Fit, Folds};
 use powerball_logs::regression::Data;
 
-/// The logs as rows, how they are held out, and what the search was told.
+/// The logs as rows, how they are held out, and what was given to the search.
 pub(super) struct Study<'a> {
     /// The logs to fit.
     pub(super) data: Data<'a>,
-    /// Their columns that were made already.
+    /// Columns of the logs to fit that were made already.
     pub(super) made: Made,
     /// The validation set: logs of another path, on which additions must hold.
     pub(super) validation: Data<'a>,
-    /// Its columns that were made already.
+    /// Columns of the validation set that were made already.
     pub(super) made_on_validation: Made,
     /// How the logs to fit are held out.
     pub(super) folds: Folds,
     /// Whether the validation set repeats the path of the fitted logs.
     pub(super) one_path: bool,
-    /// What it was told beside the logs.
+    /// What the search was given in addition to the logs.
     pub(super) options: &'a ExplainOptions<'a>,
 }
 
 impl<'a> Study<'a> {
-    /// The same logs with one multibody model for all joints.
+    /// This study with one multibody model for all joints.
     pub(super) fn joint_fit(&self) -> Study<'a> {
         let [made, made_on_validation] = [Made::default(), Made::default()];
         let (data, validation) = (self.data.joint_fit(), self.validation.joint_fit());
@@ -48,7 +48,7 @@ impl<'a> Study<'a> {
         Context::new(&self.data, fit, residual, self.rule()).with(&self.made)
     }
 
-    /// The same on the validation set.
+    /// A model seen on the validation set, with what is left of it.
     pub(super) fn on_validation<'c>(&'c self, fit: &'c Fit, residual: &'c [Vec<f64>]) -> Context<'c> {
         Context::new(&self.validation, fit, residual, self.rule()).with(&self.made_on_validation)
     }

@@ -15,7 +15,7 @@ pub(super) struct Behind<'a> {
     pub parameters: usize,
     pub terms: usize,
     pub payload: bool,
-    /// Of the rigid arm, beside the inverse dynamics.
+    /// Functions of the rigid arm, in addition to the inverse dynamics.
     pub functions: &'a [Function],
 }
 

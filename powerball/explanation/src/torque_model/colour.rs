@@ -1,4 +1,4 @@
-//! The colour of what a model leaves, and how much it errs: what a watch measures changes against.
+//! The colour of what a model leaves, and how large its error is: what a watch measures changes against.
 
 use super::rows::{Rows, Shown};
 use super::{Detector, TorqueModel};
@@ -14,13 +14,13 @@ const FEWEST: usize = 200;
 /// The margin is such that no test on the logs it was learnt from comes nearer to an alarm than the level to the power
 /// of this.
 const CALM: f64 = 0.5;
-/// A joint whose model errs by more standard deviations than this cannot be watched.
+/// A joint whose model is wrong by more standard deviations than this cannot be watched.
 const MOST_MARGIN: f64 = 1.5;
 /// Rows in which a colour's impulse response is over.
 const IMPULSE: usize = 2000;
 /// Steps of the search for a margin.
 const STEPS: usize = 8;
-/// Joints together may need margins so many times as large as each by itself.
+/// Joints together may need margins up to this many times as large as each by itself.
 const TOGETHER: f64 = 4.0;
 
 /// What a model leaves on logs on which it holds.
@@ -28,7 +28,7 @@ const TOGETHER: f64 = 4.0;
 pub struct Colour {
     /// Samples a second of the logs.
     pub rate: f64,
-    /// By joint; none of a joint that was not seen to move, or whose model errs too much.
+    /// By joint; none for a joint that was not seen to move, or whose model's error is too large.
     pub joints: Vec<Option<JointColour>>,
 }
 
@@ -61,7 +61,7 @@ impl JointColour {
         [self.deviation * f64::sqrt(squares), self.deviation * self.margin * f64::abs(sum)]
     }
 
-    /// The same with another margin.
+    /// This colour with another margin.
     fn with(&self, margin: f64) -> JointColour {
         let mut own = self.clone();
         own.margin = margin;
@@ -104,7 +104,7 @@ impl Colour {
         Colour::of_rows(&rows, 1.0 / step, level, range)
     }
 
-    /// The same of rows of logs with `rate` samples a second.
+    /// As [`Colour::learn`], from rows of logs with `rate` samples a second.
     #[must_use]
     pub fn of_rows(rows: &[Rows], rate: f64, level: f64, range: f64) -> Option<Colour> {
         let dof = rows.first()?.joints.len();

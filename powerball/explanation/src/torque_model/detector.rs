@@ -21,7 +21,7 @@ struct Own {
     /// A constant torque: what has no other name.
     constant: Bet<f64, 1>,
     friction: Bet<f64, 1>,
-    /// Its zero, which shows in the torques of all.
+    /// The joint's zero, which shows in the torques of all joints.
     zero: Bet<f64, 1>,
 }
 

@@ -37,7 +37,7 @@ impl From<NamedTerm> for TermEntry {
     }
 }
 
-/// A law in the file: its name under `law`, its numbers beside it.
+/// A law in the file: its name under `law`, its numbers next to it.
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "Law<f64>", tag = "law", rename_all = "snake_case")]
 enum LawEntry {
@@ -174,7 +174,7 @@ mod from_one {
     }
 }
 
-/// The same for two joints.
+/// As [`from_one`], for two joints.
 mod pair_from_one {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -201,7 +201,7 @@ impl TorqueModel {
         TorqueModel::parse(&read_text(path)?, path)
     }
 
-    /// The same from the text of a file, which `path` names in errors.
+    /// As [`TorqueModel::read`], from the text of a file; `path` is its name in errors.
     ///
     /// # Errors
     /// [`FileError`] where it is no model.

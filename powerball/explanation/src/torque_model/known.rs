@@ -29,7 +29,7 @@ impl TorqueModel {
         }
     }
 
-    /// The same for logs of motors.
+    /// As [`Self::take_out`], for logs of motors.
     fn take_out_of(&self, body: &RigidArm, logs: &mut [Log]) {
         self.additions.log_changes.clean(logs);
         if self.additions.terms.is_empty() {
@@ -79,7 +79,7 @@ impl Additions {
         known
     }
 
-    /// The same torque with terms that were fitted at logged positions of a joint written for true ones,
+    /// Keeps the torque and writes terms that were fitted at logged positions of a joint for true ones,
     /// `offset` rad less.
     pub(crate) fn put_zero_right(&mut self, joint: JointNumber, offset: f64) {
         let moved = |NamedTerm { effect, term, std }: NamedTerm| {
@@ -195,7 +195,7 @@ fn between(t: &[f64], x: &[f64], at: f64) -> f64 {
 pub struct ModelFile {
     /// The model.
     pub model: TorqueModel,
-    /// Its file.
+    /// The model's file.
     pub file: PathBuf,
 }
 
@@ -208,7 +208,7 @@ impl ModelFile {
         ModelFile::parse(&read_text(file)?, file)
     }
 
-    /// The same from the text of a file, which `file` names in errors.
+    /// As [`ModelFile::read`], from the text of a file; `file` is its name in errors.
     ///
     /// # Errors
     /// As [`TorqueModel::parse`].

@@ -108,9 +108,9 @@ pub struct LogChanges {
 /// A body that a link carries.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Payload {
-    /// Its mass, kg.
+    /// Mass of the payload, kg.
     pub mass: f64,
-    /// Its centre in the link's frame, m; it counts as a point.
+    /// Centre of mass in the link's frame, m; the payload counts as a point.
     pub com: [f64; 3],
     /// The link, from 1; the last where none is named.
     #[serde(default, skip_serializing_if = "Option::is_none")]

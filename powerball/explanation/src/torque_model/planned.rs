@@ -88,7 +88,8 @@ impl TorqueModel {
         Ok(NumericArm::new(&model, &values, offset)?.map(|held| arm.holding(held)))
     }
 
-    /// The same parameters and friction without the effects; the arm's changes and its encoders' zeros stay.
+    /// This model's parameters and friction without the effects; the arm's changes and its encoders' zeros
+    /// stay.
     #[must_use]
     pub fn base(&self) -> TorqueModel {
         let mut base = self.clone();
@@ -103,7 +104,7 @@ impl TorqueModel {
     }
 
     /// The terms that depend on positions alone, constant torques among them: what an arm that a hand guides is held
-    /// against besides its weight.
+    /// against in addition to its weight.
     #[must_use]
     pub fn holding_terms(&self) -> Vec<Term<f64>> {
         let of_position = |law: &Law<f64>| {

@@ -11,7 +11,8 @@ use powerball_logs::signal::{Band, difference, motion};
 
 /// The band of the rows, Hz.
 pub const BAND: f64 = 20.0;
-/// Rows begin and end so long inside a stretch, s: what its filters do not know of the time beyond has died out by then.
+/// Rows begin and end this long inside a stretch, s: what its filters do not know of the time beyond has died
+/// out by then.
 const ENDS: f64 = 0.16;
 /// A slower joint rests, rad/s or m/s: what is left there is how it sticks.
 const REST: f64 = motion::REST_SPEED;
@@ -38,14 +39,14 @@ pub struct Shown {
 /// The rows of a stretch of time on an even grid.
 #[derive(Clone, Debug, Default)]
 pub struct Rows {
-    /// Their times in the log's own t, s.
+    /// The rows' times in the log's own t, s.
     pub t: Vec<f64>,
     /// By joint and row; none while the joint rests.
     pub joints: Vec<Vec<Option<Shown>>>,
 }
 
 impl Rows {
-    /// Those of a recording for which a model of the arm `body` predicts a torque, n a sample.
+    /// The rows of a recording for which a model of the arm `body` predicts a torque, n a sample.
     #[must_use]
     pub fn new(model: &TorqueModel, body: &RigidArm, recording: &Recording, predicted: &[f64]) -> Rows {
         let n = recording.dof;
@@ -80,7 +81,7 @@ impl Rows {
     }
 }
 
-/// Rows a second of logs of so many samples a second.
+/// Rows a second of logs with `rate` samples a second.
 #[must_use]
 pub fn rows_a_second(rate: f64) -> f64 {
     rate / Band::new(BAND, rate).decimation as f64

@@ -86,7 +86,8 @@ impl TorqueModel {
     }
 
     /// The file for an arm file's arm: dynamics with the model's values baked in, friction, terms, and
-    /// `TorqueModel::torque`, which puts them together. `functions` are emitted beside the inverse dynamics.
+    /// `TorqueModel::torque`, which puts them together. `functions` are emitted in addition to the inverse
+    /// dynamics.
     ///
     /// # Errors
     /// [`SourceError`].
@@ -123,7 +124,8 @@ impl TorqueModel {
         Ok(text)
     }
 
-    /// The same with `extern "C"` functions whose names begin with `prefix`, and a header for them.
+    /// As [`Self::source`], with `extern "C"` functions whose names begin with `prefix`, and a header for
+    /// them.
     ///
     /// The model is the caller's own memory, so there is no allocation; no pointer is kept.
     ///

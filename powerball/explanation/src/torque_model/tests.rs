@@ -155,7 +155,7 @@ fn a_model_of_another_arm_is_refused_with_the_reason() {
     assert!(changes.of(body.arm()).unwrap_err().to_string().contains("'mx9'"));
 }
 
-/// The same arm: its logs shifted by an offset, its terms written for true positions.
+/// One arm: its logs shifted by an offset, its terms written for true positions.
 #[test]
 fn putting_a_zero_right_does_not_change_the_torque() {
     let body = body();

@@ -3,7 +3,7 @@
 use powerball_logs::log::{LiveSample, Log};
 use powerball_logs::signal::resample;
 
-/// So many seconds are kept.
+/// Time that is kept, s.
 const KEPT: f64 = 40.0;
 /// A longer step is a gap, s.
 const GAP: f64 = 0.1;
@@ -13,7 +13,8 @@ const GAP: f64 = 0.1;
 pub(super) struct Buffer {
     /// s.
     step: f64,
-    /// Stretches begin on every so many points of the grid, so that rows are at the same times in all.
+    /// Stretches begin on multiples of this many points of the grid, so that rows are at the same times in
+    /// all.
     decimation: usize,
     /// A point of the grid, s.
     origin: f64,

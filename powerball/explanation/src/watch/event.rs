@@ -15,7 +15,7 @@ pub struct Event {
     pub what: String,
     /// The joints on which it shows.
     pub joints: Vec<JointNumber>,
-    /// Its size in SI units, as `parameters` of explained.json.
+    /// The event's size in SI units, as `parameters` of explained.json.
     pub value: Map<String, Value>,
     /// When it began, s in the log's own t.
     pub since: f64,
@@ -37,7 +37,7 @@ pub struct Evidence {
     pub capital: f64,
     /// χ² that the name explains.
     pub explains: f64,
-    /// The share of what the model errs more than usual that stays with the name.
+    /// The share of the error beyond the usual that stays with the name.
     pub left: f64,
     /// Other names that explain as much or nearly so.
     pub rivals: Vec<String>,

@@ -9,17 +9,17 @@ use powerball_controller::JointNumber;
 use powerball_logs::regression::{Data, DataOptions, Signals};
 use serde_json::{Map, Value, json};
 
-/// It is asked so often what an alarm means, s.
+/// Period at which the meaning of an alarm is determined, s.
 const ASK: f64 = 0.4;
-/// A stretch for naming begins so many seconds before the change.
+/// A stretch for naming begins this long before the change, s.
 const LEAD: f64 = 1.5;
 /// The longest stretch back to a change, s.
 const LONGEST: f64 = 30.0;
-/// A push that ended so long ago is over, s.
+/// A push that ended this long ago is over, s.
 const OVER: f64 = 0.4;
-/// A name is given after so many seconds where it is clear …
+/// A name is given after this time where it is clear, s …
 const CLEAR: f64 = 2.0;
-/// … and after so many in any case.
+/// … and after this time in any case, s.
 const LATEST: f64 = 5.0;
 /// A change of another size by less than this share of it is the same one, better known.
 const SAME: f64 = 0.35;
@@ -154,7 +154,7 @@ impl Stream<'_> {
             return Some(new);
         }
         let refined = named.changes.iter().all(|change| self.refines(change));
-        // How much the model errs with a change whose size is known roughly must be seen first.
+        // How large the model's error is with a change whose size is known roughly must be seen first.
         if !matches!(named.changes[..], [Change::Force { .. }]) {
             self.learn_again(0..self.colours.len());
         }
@@ -164,7 +164,7 @@ impl Stream<'_> {
         (!refined).then_some(new)
     }
 
-    /// Whether a change only corrects the size of one that was said already.
+    /// Whether a change only corrects the size of one that was reported already.
     fn refines(&self, change: &Change) -> bool {
         let size = |change: &Change| match change {
             Change::Friction { by, .. } | Change::Offset { by, .. } | Change::Delay { by, .. } => by.abs(),
@@ -176,7 +176,7 @@ impl Stream<'_> {
     }
 }
 
-/// The share of what the model errs more than usual that stays with another residual.
+/// The share of the error beyond the usual that stays with another residual.
 fn left(stretch: &Stretch<'_>, residual: &Signals, from: f64, edges: &[f64]) -> f64 {
     let before = stretch.excess(&stretch.residual, from, edges).0;
     stretch.excess(residual, from, edges).0 / before.max(1.0)

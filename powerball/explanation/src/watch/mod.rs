@@ -30,7 +30,7 @@ pub struct WatchOptions {
     pub hours: f64,
     /// By how much of itself each joint's friction may wander.
     pub friction_range: f64,
-    /// Where the model does not say its colour: so many seconds of motion are taken as good.
+    /// Where the model file has no colour: the motion of this time is taken as good, s.
     pub learn: f64,
     /// The thresholds for names.
     pub rule: Rule,
@@ -43,7 +43,7 @@ impl Default for WatchOptions {
 }
 
 impl WatchOptions {
-    /// The level of the alarm for rows of logs with so many samples a second.
+    /// The level of the alarm for rows of logs with `rate` samples a second.
     #[must_use]
     pub fn level(&self, rate: f64) -> f64 {
         self.hours * 3600.0 * rows_a_second(rate)
@@ -81,7 +81,7 @@ impl<'a> Watch<'a> {
         Watch { setting: Setting { body, model, options, file }, first: Vec::new(), stream: None }
     }
 
-    /// What is to be said of the stream beside events; each once.
+    /// What is to be reported about the stream in addition to events; each once.
     pub fn notes(&mut self) -> Vec<String> {
         self.stream.as_mut().map(Stream::notes).unwrap_or_default()
     }

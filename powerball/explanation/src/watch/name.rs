@@ -18,27 +18,28 @@ use powerball_logs::regression::{Column, Data, PULLED, Signals};
 pub(super) const GRID: f64 = 0.1;
 /// Beginnings on a finer one, s: a row more or less tells a sudden change.
 const FINE: f64 = 0.02;
-/// A push lasts so long at least, s.
+/// A push lasts at least this long, s.
 const SHORTEST: f64 = 0.3;
 /// How far before the first guess a change may begin, s.
 const AROUND: f64 = 0.6;
 /// Times that an inertia or a secant is taken anew from the last estimate.
 const ROUNDS: usize = 4;
-/// Further joints whose friction has changed as well explain so much of χ² each.
+/// Further joints whose friction has changed as well explain at least this much of χ² each.
 const FURTHER: f64 = 30.0;
-/// When exactly a change sets in is known roughly: rows so long before and after it say nothing of its size, s.
+/// When exactly a change sets in is known roughly: rows within this time before and after it show nothing of
+/// its size, s.
 const BLURRED: [f64; 2] = [0.15, 0.3];
 /// χ² of such a row that noise does not reach.
 const ANYTHING: f64 = 16.0;
-/// They hold at most so many times what the others do: a step through the colour is largest where it is.
+/// They hold at most this many times what the others do: a step through the colour is largest where it is.
 const EDGES: f64 = 4.0;
-/// A force elsewhere than on the tool counts as so many alternatives for each link.
+/// A force elsewhere than on the tool counts as this many alternatives for each link.
 const ELSEWHERE: f64 = 20.0;
 /// Innovations of a block.
 const BLOCK: usize = 12;
 /// A heavier body pulls more than any push that is taken for one, kg.
 const HEAVIEST: f64 = 200.0;
-/// A joint shows a change where that explains so much of its χ².
+/// A joint shows a change where that explains this much of its χ².
 const SHOWS: f64 = 15.0;
 
 /// The rows of a stretch of a log, and what is left of them.
@@ -97,7 +98,7 @@ pub(super) struct Named {
     pub(super) until: Option<f64>,
     /// χ² that it explains.
     pub(super) explains: f64,
-    /// The same less penalties.
+    /// χ² that it explains, less penalties.
     pub(super) score: f64,
     columns: Vec<Column>,
     coefficients: Vec<f64>,
@@ -138,16 +139,16 @@ impl<'a> Stretch<'a> {
         for run in self.data.joints[j].runs() {
             for k in run.start + ORDER..run.end {
                 let past = colour.coefficients.iter().enumerate();
-                let told: f64 = past.map(|(lag, a)| a * values[k - 1 - lag]).sum();
-                white[k] = (values[k] - told) / colour.deviation;
+                let predicted: f64 = past.map(|(lag, a)| a * values[k - 1 - lag]).sum();
+                white[k] = (values[k] - predicted) / colour.deviation;
             }
         }
         white
     }
 
-    /// What a residual on the stretch's rows errs more than usual from a time on, and its χ² there. A block of
-    /// [`BLOCK`] innovations counts by its sum: what changes is slow, and usual is what the margin allows. Rows near
-    /// `edges` do not count.
+    /// The error of a residual on the stretch's rows beyond the usual from a time on, and its χ² there. A
+    /// block of [`BLOCK`] innovations counts by its sum: what changes is slow, and usual is what the margin
+    /// allows. Rows near `edges` do not count.
     pub(super) fn excess(&self, residual: &Signals, since: f64, edges: &[f64]) -> (f64, f64) {
         let (mut excess, mut square) = (0.0, 0.0);
         for (j, residual) in residual.iter().enumerate() {
@@ -213,8 +214,8 @@ impl<'a> Stretch<'a> {
     }
 
     /// χ² that rows near `edges` have beyond [`ANYTHING`] each: when exactly a change sets in is known roughly, so any of
-    /// these rows may be anything. Without this an edge beside the true one, which leaves the true one's rows to be
-    /// explained, would seem to explain more.
+    /// these rows may be anything. Without this an edge next to the true one, which leaves the true one's
+    /// rows to be explained, would seem to explain more.
     fn blurred(&self, edges: &[f64]) -> f64 {
         let near = |t: &f64| edges.iter().any(|edge| is_near(*edge, *t));
         let of = |(white, times): (&Vec<f64>, &Vec<f64>)| -> f64 {
@@ -292,7 +293,7 @@ impl<'a> Stretch<'a> {
             let ends = (SHORTEST / GRID) as usize..((now - from) / GRID).max(0.0) as usize;
             for end in ends.map(|k| Some(from + k as f64 * GRID)) {
                 tried.push(Push { link, from, end, rises: false });
-                // Elsewhere than on the tool a force is told by its columns alone.
+                // Elsewhere than on the tool a force is recognised by its columns alone.
                 tried.extend((link + 1 == n).then_some(Push { link, from, end, rises: true }));
             }
             self.best_force(context, &columns, tried, &mut best);

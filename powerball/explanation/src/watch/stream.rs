@@ -8,11 +8,12 @@ use crate::torque_model::{Colour, Detector, JointColour, Rows, rows_a_second};
 use powerball_logs::log::{LiveSample, logs_of_motors};
 use powerball_logs::regression::{DataOptions, Recording};
 
-/// Rows are made so often, s.
+/// Period at which rows are made, s.
 const HOP: f64 = 0.05;
-/// So many seconds before new rows are needed: filters and presliding have memories.
+/// Time before new rows that is needed, s: filters and presliding have memories.
 const BEFORE: f64 = 2.5;
-/// What is learnt again, of a model with a change whose size is known roughly, has so many times the margin.
+/// What is learnt again, of a model with a change whose size is known roughly, has this many times the
+/// margin.
 const AGAIN: f64 = 1.5;
 
 /// An alarm that has no name yet.
@@ -217,7 +218,7 @@ impl<'a> Stream<'a> {
     }
 }
 
-/// What is to be said before the first sample.
+/// What is to be reported before the first sample.
 fn beginning(setting: Setting<'_>, known: Option<&Colour>, rate: f64) -> Vec<String> {
     let (file, learn) = (setting.file, setting.options.learn);
     match (known, &setting.model.colour) {

@@ -55,7 +55,7 @@ struct Load {
     free: f64,
 }
 
-/// A link does as well as another one where it leaves so many times as much.
+/// A link does as well as another one where it leaves at most this many times as much.
 const AS_WELL: f64 = 1.1;
 /// The parameters of a body: of a link but for its rotor.
 fn of_a_body() -> impl Iterator<Item = ParameterKind> {

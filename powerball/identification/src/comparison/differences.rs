@@ -53,9 +53,9 @@ impl Inertia {
     }
 }
 
-/// How often differences like these come by chance (Hotelling's T²), their covariance known with so many degrees of
-/// freedom; 0 where they are too many to tell. The covariance is a sum over joints and octaves, each known with
-/// degrees of freedom of its own: those of a typical parameter stand for all.
+/// How often differences like these come by chance (Hotelling's T²), their covariance known with `freedom`
+/// degrees of freedom; 0 where they are too many to tell. The covariance is a sum over joints and octaves,
+/// each known with degrees of freedom of its own: those of a typical parameter stand for all.
 fn hotelling(difference: &[f64], weights: &Solver, freedom: f64) -> f64 {
     let count = weights.kept().len() as f64;
     let left = freedom - count + 1.0;
@@ -76,7 +76,7 @@ impl Differences {
         let mut warnings = Vec::new();
         for side in [a, b].into_iter().filter(|side| side.uncertainty.is_none()) {
             warnings.push(format!(
-                "{}: there is no covariance.json beside it: standard errors count one by one, so less is \
+                "{}: there is no covariance.json next to it: standard errors count one by one, so less is \
                     seen; identify \
                     again to have it",
                 side.name
@@ -319,10 +319,10 @@ impl Difference {
 // What varies from run to run: no residual's spread has it, and two parts of one log tell it.
 
 impl Side {
-    /// The same with errors so large that fits of two parts of its logs, which are of one arm, differ by no more than
-    /// these: what varies from run to run and from path to path, and what the model lacks, is in no residual's spread.
-    /// One factor for all errors, the mean over joints and velocities of squared differences of friction over their
-    /// variance, 1 at least.
+    /// This side with errors so large that fits of two parts of its logs, which are of one arm, differ by no
+    /// more than these: what varies from run to run and from path to path, and what the model lacks, is in no
+    /// residual's spread. One factor for all errors, the mean over joints and velocities of squared
+    /// differences of friction over their variance, 1 at least.
     #[must_use]
     pub fn repeated(mut self, [first, second]: [&Side; 2]) -> Side {
         let factor =
@@ -340,10 +340,10 @@ impl Side {
 
 // One joint's friction curves side by side.
 //
-// Two questions are asked of a curve: is it off at any of a few velocities, and is viscous friction another
-// one? The second takes all velocities together (generalised least squares on a line through zero), and sees what
-// no single velocity tells: errors of the curves at several velocities are those of the same few coefficients.
-// Half of a joint's share of the level goes to each.
+// Two questions are answered for a curve: is it off at any of a few velocities, and is viscous friction
+// another one? The second takes all velocities together (generalised least squares on a line through zero),
+// and sees what no single velocity tells: errors of the curves at several velocities are those of the same
+// few coefficients. Half of a joint's share of the level goes to each.
 
 /// Friction is compared at these shares of the rms velocity: where it breaks loose, where it bends, and where
 /// the joint is as fast as it gets.

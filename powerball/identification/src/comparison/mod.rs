@@ -1,7 +1,7 @@
 //! Two fits side by side: which parameters and friction curves truly differ, what that means in torque, and a
 //! sentence.
 //!
-//! Two fits never come to the same numbers. What differs is told by the covariance of both: intervals that
+//! Two fits never come to the same numbers. What differs is decided by the covariance of both: intervals that
 //! hold all at once at one stated level (Bonferroni's, over every parameter and every point of the friction
 //! curves that is compared), and by a few questions that share the level: inertia, each joint's friction, each
 //! constant torque. So equal arms are called different in that share of comparisons and not in that share of

@@ -1,4 +1,4 @@
-//! What a comparison is told and what it gives.
+//! What a comparison is given and what it returns.
 
 use serde::Serialize;
 
@@ -46,16 +46,16 @@ pub struct Comparison {
     /// Why it should not be used, each a sentence without its full stop; empty where it may be.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unusable: Vec<String>,
-    /// What is to be said of the fits.
+    /// What is to be reported about the fits.
     pub warnings: Vec<String>,
 }
 
 /// One parameter of the minimal set.
 #[derive(Clone, Debug, Serialize)]
 pub struct ParameterDifference {
-    /// Its name: the sum it stands for.
+    /// The parameter's name: the sum it stands for.
     pub name: String,
-    /// Its value in `a`, SI units.
+    /// The value in `a`, SI units.
     pub a: f64,
     /// In `b`.
     pub b: f64,
@@ -98,7 +98,7 @@ pub struct FrictionDifference {
 pub struct ConstantDifference {
     /// Joint, from 1.
     pub joint: usize,
-    /// Its constant torque in `a`, N·m or N.
+    /// The joint's constant torque in `a`, N·m or N.
     pub a: f64,
     /// In `b`.
     pub b: f64,

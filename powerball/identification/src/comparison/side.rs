@@ -40,7 +40,7 @@ struct File {
     unusable: Vec<String>,
 }
 
-/// Degrees of freedom where nothing is said of them.
+/// Degrees of freedom where none are given.
 const MANY: f64 = 1000.0;
 
 impl Side {
@@ -58,7 +58,8 @@ impl Side {
         }
     }
 
-    /// The same with the log that was fitted, so that friction can be compared along it where the other one runs its path.
+    /// This side with the log that was fitted, so that friction can be compared along it where the other one
+    /// runs its path.
     #[must_use]
     pub fn along(mut self, log: &Log) -> Side {
         self.strokes = strokes(log);
@@ -78,15 +79,15 @@ impl Side {
         let text = dyngen::file::text(&file).map_err(|e| wrong(&file, format!("cannot be read: {e}")))?;
         let model: File = serde_json::from_str(&text)
             .map_err(|e| wrong(&file, format!("is no result of `powerball identify`: {e}")))?;
-        let beside = file.with_file_name("covariance.json");
+        let covariance = file.with_file_name("covariance.json");
         let own = file.file_name().is_some_and(|name| name == "identified.json");
-        let uncertainty = match std::fs::read(&beside) {
+        let uncertainty = match std::fs::read(&covariance) {
             Ok(bytes) if own => {
                 let read: Uncertainty = serde_json::from_slice(&bytes)
-                    .map_err(|e| wrong(&beside, format!("cannot be used: {e}")))?;
+                    .map_err(|e| wrong(&covariance, format!("cannot be used: {e}")))?;
                 let same = read.parameters.iter().eq(model.parameters.iter().map(|p| &p.name));
                 if !(same && read.joints == model.friction.len() && read.is_whole()) {
-                    return Err(wrong(&beside, "does not fit identified.json: identify again".into()));
+                    return Err(wrong(&covariance, "does not fit identified.json: identify again".into()));
                 }
                 Some(read)
             }

@@ -30,7 +30,7 @@ pub(super) struct Change {
     friction: f64,
     /// How much more it is in the other.
     difference: f64,
-    /// Its standard error.
+    /// The standard error of the difference.
     std: f64,
     freedom: f64,
 }

@@ -99,7 +99,7 @@ fn equal_arms_are_equal_and_five_per_cent_of_viscous_friction_is_seen() {
 }
 
 #[test]
-fn a_payload_is_told_with_its_mass() {
+fn a_payload_is_reported_with_its_mass() {
     let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
     let a = usual();
     let mut links = lwa4p::links();
@@ -115,8 +115,8 @@ fn a_payload_is_told_with_its_mass() {
     assert!(!loaded.friction.iter().any(|f| f.differs), "{}", loaded.sentence);
 }
 
-/// An arm whose friction differs by a tenth between the halves of its own log is not said to differ by a twentieth from
-/// another one; halves that are alike change nothing to speak of.
+/// An arm whose friction differs by a tenth between the halves of its own log is not reported to differ by a
+/// twentieth from another one; halves that are alike change nothing to speak of.
 #[test]
 fn what_varies_within_a_log_is_no_difference_of_arms() {
     let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
@@ -129,7 +129,7 @@ fn what_varies_within_a_log_is_no_difference_of_arms() {
 }
 
 #[test]
-fn what_cannot_be_compared_is_told() {
+fn what_cannot_be_compared_is_reported() {
     let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
     let a = usual();
     let mut other = a.clone();

@@ -114,7 +114,7 @@ fn in_words(change: &Change, rival: bool, unit: &Unit, why: &str) -> (&'static s
     }
 }
 
-/// What factors by joint say of the torque columns.
+/// What factors by joint show about the torque columns.
 fn factors_in_words(unit: &Unit) -> &'static str {
     match unit {
         Unit::BeforeGear(_) => {
@@ -155,7 +155,7 @@ pub(super) fn of_arm_file(better: &Better) -> Answer {
     }
 }
 
-/// What is to be said of the arm file where no change of it fits better.
+/// What is to be reported about the arm file where no change of it fits better.
 fn arm_file(facts: &Facts<'_>) -> Answer {
     let Facts { doubts, good, .. } = *facts;
     if !doubts.is_empty() {
@@ -166,8 +166,8 @@ fn arm_file(facts: &Facts<'_>) -> Answer {
         return plain("arm file", None, why.into());
     }
     if good {
-        let fits = "No other convention and no other sign of an a, d or alpha fits clearly better; where a joint errs by \
-            more than 25 %, no quarter turn of theta and no other direction of gravity does.";
+        let fits = "No other convention and no other sign of an a, d or alpha fits clearly better; where a \
+            joint's error is more than 25 %, no quarter turn of theta and no other direction of gravity does.";
         return plain("arm file", Some(true), fits.into());
     }
     plain(
@@ -183,7 +183,7 @@ pub(super) fn plain(question: &'static str, as_said: Option<bool>, sentence: Str
     Answer { question, as_said, as_it_is: Vec::new(), as_it_would_be: Vec::new(), sentence }
 }
 
-/// What is known beside the steps.
+/// What is known in addition to the steps.
 pub(super) struct Facts<'a> {
     pub(super) sign: Common,
     pub(super) unit: &'a Unit,
@@ -227,7 +227,7 @@ pub(super) fn answers(found: &Found<'_>, facts: &Facts<'_>) -> Vec<Answer> {
         (
             "position unit",
             "Angles in radians fit.",
-            "Whether angles are in radians is not told: the fit is poor.",
+            "Whether angles are in radians cannot be determined: the fit is poor.",
         ),
     ] {
         if !asked(&all, question) {

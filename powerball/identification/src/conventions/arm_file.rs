@@ -3,10 +3,10 @@
 //!
 //! Each answer is an arm with one thing changed, judged like a reading of the columns: one rigid arm and textbook
 //! friction, fitted to one part of the logs and judged by the other. Its columns are numeric Newton–Euler: to derive
-//! every such arm would take half a minute. What is told is derived then, and its columns are asked like those of any
-//! other arm.
+//! every such arm would take half a minute. The arm that is reported is derived then, and its columns are
+//! evaluated like those of any other arm.
 //!
-//! Also here: one thing that may be other than it is said to be about a log's columns.
+//! Also here: one property of a log's columns that may differ from what is declared.
 
 use super::asked::{Asked, Positions, Torques};
 use super::fit::{Gravity, Judged, Rows, judge};
@@ -26,7 +26,7 @@ const LISTED: usize = 20;
 /// A change is clear where squared errors fall to this share, as the geometric mean over joints, both ways round. The
 /// files of eight measured arms have none that is; of the UR10e's the best comes to 0.95 (docs/conventions.md).
 const CLEAR: f64 = 0.8;
-/// Changes whose squared errors differ by less, as the mean over joints, are not told apart.
+/// Changes whose squared errors differ by less, as the mean over joints, are not distinguished.
 const ALIKE: f64 = 1.1;
 /// Gravity nearer to the filed direction than this is a tilt of the base: its cosine.
 const TILT: f64 = 0.9;
@@ -36,7 +36,7 @@ const TILT: f64 = 0.9;
 pub(super) struct ArmChange {
     /// The arm as it would be.
     pub(super) arm: Arm,
-    /// Its line, and where it stands.
+    /// The changed line, and where it stands.
     pub(super) line: String,
     /// What it is as it stands.
     pub(super) now: String,
@@ -116,8 +116,8 @@ fn columns(arm: &Arm, recording: &Recording) -> Vec<f64> {
     out
 }
 
-/// Everything that is asked of an arm file: where the fit is not poor, zeros are not a quarter turn off, and gravity
-/// comes from where it is said to come from.
+/// Everything that is checked in an arm file: where the fit is not poor, zeros are not a quarter turn off,
+/// and gravity comes from the declared side.
 fn changes(arm: &Arm, poor: bool) -> Vec<ArmChange> {
     let mut all = vec![other_convention(arm)];
     for column in [Table::A, Table::D, Table::Alpha] {
@@ -265,7 +265,7 @@ fn gravities(arm: &Arm) -> Vec<ArmChange> {
     all
 }
 
-// One thing that may be other than it is said to be about a log's columns.
+// One property of a log's columns that may differ from what is declared.
 
 /// A change of the reading.
 #[derive(Clone, Debug, PartialEq)]
@@ -303,12 +303,12 @@ pub(super) struct Reading {
 }
 
 impl Reading {
-    /// As the columns are said to be.
+    /// The columns as declared.
     pub(super) fn plain(dof: usize) -> Reading {
         Reading { torques: Torques::plain(dof), positions: Positions::plain(dof), gravity: Gravity::Included }
     }
 
-    /// The same with a change.
+    /// This reading with a change.
     pub(super) fn with(&self, change: &Change) -> Reading {
         let mut read = self.clone();
         match change {

@@ -19,11 +19,11 @@ struct Size {
     rate: f64,
 }
 
-/// For what is asked of the torques: one set of rows for all questions.
+/// For questions about the torques: one set of rows for all questions.
 const WHOLE: Size = Size { seconds: 240.0, rate: 50.0 };
-/// For what is asked of the positions: other rows for each question.
+/// For questions about the positions: other rows for each question.
 const FEW: Size = Size { seconds: 60.0, rate: 25.0 };
-/// For what is asked of the arm file: other columns for each question, and small differences.
+/// For questions about the arm file: other columns for each question, and small differences.
 const SLOW: Size = Size { seconds: 240.0, rate: 25.0 };
 
 /// Logs with the part that each belongs to; without one its halves are the parts.
@@ -121,7 +121,7 @@ pub(super) fn decimate(logs: &[Log], most: f64, rate: f64) -> Vec<Log> {
     let length = |log: &Log, piece: &Range<usize>| log.t[piece.end - 1] - log.t[piece.start];
     let whole: f64 = logs.iter().flat_map(|log| log.pieces.iter().map(move |piece| length(log, piece))).sum();
     let mut out = Vec::new();
-    // Every so many stretches one is taken.
+    // One stretch in `every` is taken.
     let every = (whole / most).ceil().max(1.0) as usize;
     let mut count = 0;
     for log in logs {

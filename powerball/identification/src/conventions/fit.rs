@@ -123,8 +123,8 @@ fn fit(rows: &Rows<'_>, sums: &[[Sums; 2]], part: usize, ridge: f64) -> PartFit 
 }
 
 /// The factors κ by joint with which the inertial torque of one body comes nearest to every joint's torque in
-/// a part, friction beside it: Gauss–Newton steps for body and factors together, factors held back where nothing
-/// determines them.
+/// a part, with friction added: Gauss–Newton steps for body and factors together, factors held back where
+/// nothing determines them.
 pub(super) fn factors_of_body(rows: &Rows<'_>, read: &Torques, part: usize, ridge: f64) -> Vec<f64> {
     let (n, size, inertial) = (rows.dof(), rows.size(), rows.inertial());
     let sums: Vec<[Sums; 2]> = (0..n).map(|joint| [0, 1].map(|part| sums(rows, read, joint, part))).collect();
@@ -263,7 +263,7 @@ impl<'a> Rows<'a> {
         Ok(Rows::of(data, part))
     }
 
-    /// The same rows with the columns of another arm: `count` parameters, and what they are along a recording,
+    /// These rows with the columns of another arm: `count` parameters, and what they are along a recording,
     /// samples × n × parameters.
     pub(super) fn of_columns(&self, count: usize, columns: impl Fn(&Recording) -> Vec<f64>) -> Rows<'a> {
         Rows::of(self.data.of_other_columns(count, columns), &self.part)

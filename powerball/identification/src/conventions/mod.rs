@@ -1,9 +1,11 @@
-//! What the columns of a log are: signs, units, order, side of the gear, gravity, delay. Told, never changed.
+//! What the columns of a log are: signs, units, order, side of the gear, gravity, delay. Reported, never
+//! modified.
 //!
 //! Every answer is judged against its alternatives: by the held-out error of one rigid arm with textbook
 //! friction, fitted to one part of the logs and judged by the other, both ways round; and by what cannot be
 //! negative, the energy of motion and the power that friction takes. Only what lowers squared errors to half
-//! both ways round, or has a physical sign that is sure in both parts, is told as other than it is said to be.
+//! both ways round, or has a physical sign that is sure in both parts, is reported as different from what is
+//! declared.
 //!
 //! | | |
 //! |---|---|
@@ -34,7 +36,7 @@ use search::{Found, gravity_is, search};
 /// What the columns of some logs of an arm are. `validate` are logs of another path, if there are any; without
 /// them the halves of each log judge each other.
 ///
-/// Nothing is changed by it, and nothing fails: where the logs hold too little, that is told.
+/// Nothing is changed by it, and nothing fails: where the logs hold too little, that is reported.
 #[must_use]
 pub fn conventions(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Conventions {
     let mut result = asked_of_arm(body, logs, validate);
@@ -58,16 +60,17 @@ fn asked_of_arm(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Conventions 
     let asked = Asked::new(body, logs, validate);
     let found = match search(&asked) {
         Ok(found) => found,
-        Err(why) => return not_told(&why.to_string()),
+        Err(why) => return not_determined(&why.to_string()),
     };
     let all: Vec<&Log> = logs.iter().chain(validate).collect();
     let kind = properties::kind(&all);
-    // The pose of a joint that does not move is any angle of the arm file, and what no arm is has been said.
+    // The pose of a joint that does not move is any angle of the arm file, and an arm file that describes no
+    // arm was reported.
     let moves = inactive_joints(body.arm(), logs).iter().all(Option::is_none);
     let better =
         if moves && body.filed().doubts().is_empty() { arm_file::better(&asked, &found) } else { None };
     let Some(better) = better else { return result(&asked, &found, kind) };
-    // What the columns are is asked of the arm that they fit.
+    // What the columns are is evaluated with the arm that they fit.
     let answer = answers::of_arm_file(&better);
     let of_other = RigidArm::new(&better.change.arm).ok().and_then(|body| {
         let asked = Asked::new(&body, logs, validate);
@@ -82,7 +85,7 @@ fn asked_of_arm(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Conventions 
     result
 }
 
-fn not_told(why: &str) -> Conventions {
+fn not_determined(why: &str) -> Conventions {
     let sentence = format!("What the columns are is not shown by these logs: {why}.");
     let answer = Answer {
         question: "columns",

@@ -7,7 +7,7 @@ use super::fit::{FRICTION, PartFit, Rows};
 
 /// Samples of a part that are looked at.
 const SAMPLES: usize = 300;
-/// Errors of neighbouring rows are alike: standard errors of independent rows are taken so many times.
+/// Errors of neighbouring rows are alike: standard errors of independent rows are multiplied by this.
 const ALIKE: f64 = 3.0;
 
 /// A quantity that a fit determines.

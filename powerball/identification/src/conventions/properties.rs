@@ -145,7 +145,8 @@ pub(super) fn unit(found: &Found<'_>, scale: Scale) -> Unit {
         if agree(&constants) {
             return Unit::Ampere(constants);
         }
-        // Most columns of one unit, and a few that are surely not of it; anything between is told as it is.
+        // Most columns of one unit, and a few that are surely not of it; anything between is reported as it
+        // is.
         let odd = gains.iter().filter(|g| g.ln().abs() > FACTOR.ln()).count();
         let usual = gains.iter().filter(|g| g.ln().abs() < AGREE.ln()).count();
         let few = 3 * odd <= gains.len() && odd + usual == gains.len() && scale != Scale::TooSmall;

@@ -1,4 +1,4 @@
-//! What is told of a log's columns: the `conventions` of identified.json and explained.json.
+//! What is reported about a log's columns: the `conventions` of identified.json and explained.json.
 //!
 //! Also here: the column map that would set columns right.
 
@@ -53,7 +53,7 @@ pub struct TorqueColumns {
     /// By joint: the column that holds its torque, where that is not its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub order: Option<Vec<JointNumber>>,
-    /// By joint: the factor that its column needs beside the others, where they differ.
+    /// By joint: the factor that its column needs compared with the others, where they differ.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub factor: Option<Vec<f64>>,
 }
@@ -74,7 +74,7 @@ pub struct PositionColumns {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum PerJoint<T> {
-    /// The same for all.
+    /// One value for all joints.
     All(T),
     /// By joint.
     Each(Vec<T>),
@@ -118,23 +118,24 @@ pub struct Answer {
     pub question: &'static str,
     /// Whether the columns are as they should be; `None` where these logs do not tell.
     pub as_said: Option<bool>,
-    /// Held-out error by joint as the columns are said to be, % of the torque; empty where that is not the
+    /// Held-out error by joint with the columns as declared, % of the torque; empty where that is not the
     /// evidence.
     pub as_it_is: Vec<Option<f64>>,
-    /// The same as they are taken to be here.
+    /// Held-out error by joint with the columns as they are taken to be here.
     pub as_it_would_be: Vec<Option<f64>>,
     /// The answer with its evidence.
     pub sentence: String,
 }
 
 impl Conventions {
-    /// Whether some column is surely not what it is said to be.
+    /// Whether some column is surely not what it is declared to be.
     #[must_use]
     pub fn differ(&self) -> bool {
         self.answers.iter().any(|answer| answer.as_said == Some(false))
     }
 
-    /// What is said of gravity where it may have been taken out of the torques: a balanced arm looks the same.
+    /// What is reported about gravity where it may have been taken out of the torques: a balanced arm looks
+    /// the same.
     fn doubt(&self) -> Option<&str> {
         let open = |a: &&Answer| a.question == "gravity" && a.as_said.is_none();
         let answer =
@@ -148,7 +149,7 @@ impl Conventions {
         self.differ() || self.is_unclear() || self.doubt().is_some()
     }
 
-    /// Whether so much is left with everything set right that the columns cannot be checked.
+    /// Whether too much is left with everything set right to check the columns.
     #[must_use]
     pub fn is_unclear(&self) -> bool {
         self.left.iter().any(|left| *left > MUCH)
@@ -176,7 +177,7 @@ impl Conventions {
             let what = match (&self.arm_file, self.suggested_map.is_some()) {
                 (Some(_), false) => "The arm file is not this arm's.",
                 (Some(_), true) => "Neither the arm file nor the columns are right.",
-                (None, _) => "The columns are not what they are said to be.",
+                (None, _) => "The columns are not what they are declared to be.",
             };
             let left = left.map_or(String::new(), |left| format!(" Even so {left}."));
             return format!("{what} {}{left} Nothing was changed.{suggested_map}", wrong.join(" "));
@@ -187,7 +188,7 @@ impl Conventions {
             Some(left) => format!(
                 "What the columns are cannot be checked: {left}. Columns and arm file are taken as they stand"
             ),
-            None => "The columns are taken as they are said to be; nothing in these logs speaks clearly against it"
+            None => "The columns are taken as declared; nothing in these logs speaks clearly against it"
                 .to_string(),
         };
         if let Some(doubt) = self.doubt() {

@@ -9,11 +9,12 @@ use super::result::GravityIs;
 use dyngen::exact::rational::to_f64;
 use powerball_logs::regression::DataError;
 
-/// Held-out squared errors are compared beside this share of the torque's: below 2 % nothing is asked for.
+/// Held-out squared errors are compared after adding this share of the torque's: below 2 % nothing is asked
+/// for.
 const FLOOR: f64 = 4e-4;
 /// A change is clear where it lowers squared errors to this share, both ways round.
 const CLEAR: f64 = 0.5;
-/// Gravity helps where squared errors grow to so many times without it.
+/// Gravity helps where squared errors grow at least this many times without it.
 const HELPS: f64 = 1.2;
 /// It does nothing where they grow to less than this.
 const NO_WORSE: f64 = 1.05;
@@ -25,7 +26,7 @@ const FITS: f64 = 0.1;
 const GOOD: f64 = 0.35;
 /// A joint with an error above this may have a wrong position column.
 pub(super) const POOR: f64 = 0.25;
-/// Two changes whose gains differ by less are not told apart.
+/// Two changes whose gains differ by less are not distinguished.
 const ALIKE: f64 = 0.7;
 /// Changes that are looked for.
 const MOST: usize = 5;
@@ -324,7 +325,7 @@ fn of_positions(
     tried
 }
 
-/// Whether torques hold gravity: told where the other reading fits clearly worse.
+/// Whether torques hold gravity: determined where the other reading fits clearly worse.
 pub(super) fn gravity_is(asked: &Asked<'_>, found: &Found<'_>) -> Option<GravityIs> {
     if found.read.gravity == Gravity::TakenOut || asked.body.gravity().iter().all(|g| *g == 0.0) {
         return Some(GravityIs::TakenOut);
@@ -334,9 +335,9 @@ pub(super) fn gravity_is(asked: &Asked<'_>, found: &Found<'_>) -> Option<Gravity
     (worse(0) && worse(1) && gain(&without, &with) > 0.0).then_some(GravityIs::Included)
 }
 
-/// Whether torques that hold hardly any weight hold what there is of it: told where without gravity's columns the fit is
-/// worse, as the mean over joints, both ways round; or no worse, both ways round. Between them a balanced arm may carry
-/// something in one part of the logs.
+/// Whether torques that hold hardly any weight hold what there is of it: determined where without gravity's
+/// columns the fit is worse, as the mean over joints, both ways round; or no worse, both ways round. Between
+/// them a balanced arm may carry something in one part of the logs.
 pub(super) fn little_gravity_is(asked: &Asked<'_>, found: &Found<'_>) -> Option<GravityIs> {
     let Some((with, without)) = with_and_without_gravity(asked, found) else {
         return Some(GravityIs::TakenOut);

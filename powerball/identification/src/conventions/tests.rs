@@ -1,4 +1,4 @@
-//! One thing wrong with the columns of a sound log, and what is told of it.
+//! One thing wrong with the columns of a sound log, and what is reported about it.
 
 use super::{Conventions, GravityIs, Kind, PerJoint, Side, conventions};
 use crate::excite::{Fourier, Harmonics};
@@ -27,7 +27,7 @@ static SOUND: LazyLock<(RigidArm, Vec<Log>)> = LazyLock::new(|| {
     (body, (0..6).map(log).collect())
 });
 
-/// What is told of the logs after something was done to them.
+/// What is reported about the logs after something was done to them.
 fn result(spoil: impl Fn(&mut Log)) -> Conventions {
     let (body, logs) = &*SOUND;
     let logs: Vec<Log> = logs
@@ -47,7 +47,7 @@ fn scale(columns: &mut [Vec<f64>], by: f64) {
 }
 
 #[test]
-fn sound_columns_are_told_as_they_are_said_to_be() {
+fn sound_columns_are_reported_as_declared() {
     let result = result(|_| ());
     assert!(!result.differ(), "{}", result.evidence);
     assert_eq!(result.suggested_map, None);
@@ -64,7 +64,7 @@ fn sound_columns_are_told_as_they_are_said_to_be() {
 }
 
 #[test]
-fn reversed_signs_are_told() {
+fn reversed_signs_are_reported() {
     let all = result(|log| scale(&mut log.torque, -1.0));
     assert_eq!(all.torque.sign, Some(PerJoint::All(-1)), "{}", all.evidence);
     assert_eq!(all.suggested_map.as_deref(), Some("tau = { sign = -1 }"));
@@ -78,7 +78,7 @@ fn reversed_signs_are_told() {
 }
 
 #[test]
-fn other_units_are_told() {
+fn other_units_are_reported() {
     let milli = result(|log| scale(&mut log.torque, 1000.0));
     assert_eq!(milli.torque.unit.as_deref(), Some("mN·m"), "{}", milli.evidence);
     assert_eq!(milli.suggested_map.as_deref(), Some("tau = { unit = \"mN·m\" }"));
@@ -97,7 +97,7 @@ fn other_units_are_told() {
 }
 
 #[test]
-fn exchanged_columns_are_told() {
+fn exchanged_columns_are_reported() {
     let torques = result(|log| log.torque.swap(1, 2));
     let order = |list: &Option<Vec<powerball_controller::JointNumber>>| -> Vec<usize> {
         list.iter().flatten().map(|j| j.number()).collect()
@@ -115,7 +115,7 @@ fn exchanged_columns_are_told() {
 
 /// The torque of the virtual arm's own numeric dynamics at rest is taken out.
 #[test]
-fn gravity_that_was_taken_out_is_told() {
+fn gravity_that_was_taken_out_is_reported() {
     let plant = lwa4p::plant().unwrap();
     let result = result(|log| {
         for k in 0..log.t.len() {
@@ -129,7 +129,7 @@ fn gravity_that_was_taken_out_is_told() {
 }
 
 #[test]
-fn late_torques_are_told_with_their_delay() {
+fn late_torques_are_reported_with_their_delay() {
     for by in [0.03, 0.08, 0.15] {
         let result = result(|log| {
             let step = log.t[1] - log.t[0];
@@ -155,7 +155,7 @@ fn torques_that_repeat_bit_by_bit_were_commanded() {
     assert_eq!(result.torque.kind, Some(Kind::Commanded));
 }
 
-/// Too little to ask is told, not guessed.
+/// Too little data is reported, not guessed.
 #[test]
 fn logs_that_are_too_short_tell_nothing() {
     let (body, logs) = &*SOUND;
@@ -166,8 +166,8 @@ fn logs_that_are_too_short_tell_nothing() {
     assert!(!result.differ() && result.evidence.contains("not shown"));
 }
 
-/// What is told where the logs are those of the sound arm and the file is not.
-fn told_of_arm(spoil: impl Fn(&mut Arm)) -> Conventions {
+/// What is reported where the logs are those of the sound arm and the file is not.
+fn result_for_arm(spoil: impl Fn(&mut Arm)) -> Conventions {
     let (sound, logs) = &*SOUND;
     let mut arm = sound.arm().clone();
     spoil(&mut arm);
@@ -176,10 +176,10 @@ fn told_of_arm(spoil: impl Fn(&mut Arm)) -> Conventions {
 }
 
 #[test]
-fn an_arm_file_of_the_other_convention_is_told() {
-    let result = told_of_arm(|arm| arm.convention = Convention::Modified);
+fn an_arm_file_of_the_other_convention_is_reported() {
+    let result = result_for_arm(|arm| arm.convention = Convention::Modified);
     assert_eq!(result.arm_file.as_deref(), Some("convention = \"standard\""), "{}", result.evidence);
-    // The columns are asked of the arm that they fit.
+    // The columns are evaluated with the arm that they fit.
     assert_eq!(result.torque.gravity, Some(GravityIs::Included), "{}", result.evidence);
     assert_eq!((result.torque.sign.as_ref(), result.suggested_map.as_ref()), (Some(&PerJoint::All(1)), None));
     let first = result.verdict();
@@ -187,9 +187,9 @@ fn an_arm_file_of_the_other_convention_is_told() {
 }
 
 #[test]
-fn a_zero_that_is_a_quarter_turn_off_is_told() {
+fn a_zero_that_is_a_quarter_turn_off_is_reported() {
     let quarter = Angle::PiMultiple(integer(1) / integer(2));
-    let result = told_of_arm(|arm| {
+    let result = result_for_arm(|arm| {
         let theta = &mut arm.joints[1].theta;
         *theta = Angle::sum(&[(theta.clone(), integer(1)), (quarter.clone(), integer(1))]);
     });
@@ -197,14 +197,14 @@ fn a_zero_that_is_a_quarter_turn_off_is_told() {
 }
 
 #[test]
-fn gravity_from_another_side_is_told() {
-    let result = told_of_arm(|arm| arm.gravity.rotate_right(1));
+fn gravity_from_another_side_is_reported() {
+    let result = result_for_arm(|arm| arm.gravity.rotate_right(1));
     assert_eq!(result.arm_file.as_deref(), Some("gravity = [0, 0, -9.81]"), "{}", result.evidence);
 }
 
 #[test]
-fn lengths_in_millimetres_are_told() {
-    let result = told_of_arm(|arm| {
+fn lengths_in_millimetres_are_reported() {
+    let result = result_for_arm(|arm| {
         for joint in &mut arm.joints {
             joint.a = &joint.a * integer(1000);
             joint.d = &joint.d * integer(1000);
@@ -215,12 +215,12 @@ fn lengths_in_millimetres_are_told() {
 
 #[test]
 fn gravity_in_another_unit_is_reported() {
-    let result = told_of_arm(|arm| arm.gravity = arm.gravity.each_ref().map(|g| g * integer(1000)));
+    let result = result_for_arm(|arm| arm.gravity = arm.gravity.each_ref().map(|g| g * integer(1000)));
     assert!(result.arm_file.unwrap().contains("give it in m/s²"), "{}", result.evidence);
 }
 
 #[test]
-fn joints_counted_from_the_tip_are_told() {
+fn joints_counted_from_the_tip_are_reported() {
     let result = result(|log| {
         log.q.reverse();
         log.torque.reverse();

@@ -33,7 +33,7 @@ pub fn bounded(
 }
 
 impl NormalEquations {
-    /// The same over the columns for which `wanted` holds, with some coefficients ≥ 0 (see [`bounded`]).
+    /// Solves over the columns for which `wanted` holds, with some coefficients ≥ 0 (see [`bounded`]).
     #[must_use]
     pub fn solve_bounded(
         &self,

@@ -292,7 +292,7 @@ fn times_transposed(a: &Mat<f64>, x: &[f64]) -> Vec<f64> {
 pub struct ConsistentFit {
     /// The parameters and their certificate.
     pub consistent: Consistent,
-    /// All coefficients in the order of the design: the consistent set, and the friction refitted beside it.
+    /// All coefficients in the order of the design: the consistent set, and the friction refitted with it.
     pub theta: Vec<f64>,
 }
 
@@ -379,7 +379,8 @@ const STATES: usize = 400;
 /// Velocities and accelerations where the arm file gives no limit.
 const SPEED: f64 = 1.0;
 const ACCELERATION: f64 = 3.0;
-/// What a unit of a parameter counts beside a N·m: directions that no torque shows are held by it alone.
+/// What a unit of a parameter counts compared with a N·m: directions that no torque shows are held by it
+/// alone.
 const UNSEEN: f64 = 1e-2;
 
 /// Torque differences of a parameter set's values over random states within an arm's limits.

@@ -26,7 +26,7 @@ pub struct Design {
     pub size: usize,
     /// Inertial columns.
     pub inertial: usize,
-    /// Those of one joint.
+    /// Inertial columns of one joint.
     pub set: usize,
 }
 
@@ -197,7 +197,7 @@ impl Gram {
         self.with_prior(self.all(weights))
     }
 
-    /// Those of all rows alone.
+    /// The normal equations of all rows alone.
     #[must_use]
     pub fn all(&self, weights: &[f64]) -> NormalEquations {
         let mut sum = NormalEquations::zero(self.size);
@@ -297,7 +297,7 @@ impl Folds {
     /// Lays out both kinds of folds.
     ///
     /// Whole logs: at least five, at most eight folds of neighbouring logs. Stretches: the f-th fifth of
-    /// every log is fold f, and the blocks beside it are not fitted either.
+    /// every log is fold f, and the blocks next to it are not fitted either.
     #[must_use]
     pub fn new(data: &Data<'_>) -> Folds {
         let mut names: Vec<usize> = data.blocks.iter().map(|b| b.log).collect();
@@ -359,7 +359,7 @@ impl Folds {
 // Columns that are added to a design: their products with it, from which the fit with them is a small solve.
 //
 // With the base's columns A, the added ones C and a signal y the normal equations of both need A'C, C'C and C'y
-// besides those of A (partitioned regression: Frisch and Waugh 1933).
+// in addition to those of A (partitioned regression: Frisch and Waugh 1933).
 
 /// Weighted products of k added columns.
 #[derive(Clone, Debug)]
@@ -420,8 +420,8 @@ impl Added {
         add(&mut self.right, &other.right);
     }
 
-    /// The base's shares in the added columns, by column, and the products with each other of what they have besides:
-    /// C'C − C'A (A'A)⁻¹ A'C. `base` solves the normal equations of the design.
+    /// The base's shares in the added columns, by column, and the products with each other of what the base
+    /// does not imitate of them: C'C − C'A (A'A)⁻¹ A'C. `base` solves the normal equations of the design.
     #[must_use]
     pub fn without_base(&self, base: &Solver) -> (Vec<Vec<f64>>, Mat<f64>) {
         let shares: Vec<Vec<f64>> = self.cross.iter().map(|c| base.solve(c)).collect();
@@ -433,8 +433,8 @@ impl Added {
         (shares, rest)
     }
 
-    /// Solves for the added columns, from what they have besides the base; a column that the base imitates wholly is
-    /// left out.
+    /// Solves for the added columns, from what the base does not imitate of them; a column that the base
+    /// imitates wholly is left out.
     #[must_use]
     pub fn solver(&self, rest: &Mat<f64>) -> Solver {
         Solver::new(rest, |a| rest[(a, a)] > IMITATED * self.square[(a, a)])

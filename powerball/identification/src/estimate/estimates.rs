@@ -16,9 +16,9 @@ use serde::{Deserialize, Serialize};
 /// A parameter with its standard error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ParameterEstimate {
-    /// Its name: the sum it stands for.
+    /// The parameter's name: the sum it stands for.
     pub name: String,
-    /// Its value, SI units.
+    /// The estimate, SI units.
     pub value: f64,
     /// Standard error; `None` where the logs do not determine the parameter.
     #[serde(default)]

@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// A column that was added to the base model.
 #[derive(Clone, Debug)]
 pub struct Term {
-    /// Its values.
+    /// The term's values.
     pub column: Column,
     /// Whether its coefficient must not be negative.
     pub non_negative: bool,
@@ -39,7 +39,7 @@ pub struct Fit {
     pub residual: Signals,
     /// The columns at these shapes.
     pub design: Design,
-    /// Their cross products.
+    /// Cross products of the columns.
     pub gram: Gram,
     /// The columns whose coefficients are free, tangents among them: what a screen must treat as refitted.
     pub free: Vec<bool>,

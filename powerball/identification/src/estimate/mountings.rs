@@ -20,7 +20,7 @@ pub struct Together {
     pub body: RigidArm,
     /// All logs.
     pub bands: Bands,
-    /// Those of each mounting, in the same set.
+    /// The logs of each mounting, in the same set.
     pub each: Vec<Bands>,
 }
 
@@ -61,8 +61,8 @@ impl Together {
     }
 
     /// The joints, from 1, on which one parameter vector leaves far more of the logs of a mounting than a
-    /// vector of their own does, by mounting: its mounting or another one's is told wrong, or the arm was not
-    /// the same.
+    /// vector of their own does, by mounting: its mounting or another one's is stated wrongly, or the arm was
+    /// not the same.
     #[must_use]
     pub fn contradictions(
         &self,

@@ -7,13 +7,13 @@ use powerball_logs::summary::{
     Columns, Identity, NODES, OCTAVES, RFactor, SLOW, Steepness, Summary, SummaryError,
 };
 
-/// What stands beside the minimal set in a model of a joint's torque.
+/// What a model of a joint's torque has in addition to the minimal set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FrictionKind {
     /// Eq. 16 of the paper: γ1·tanh(γ2·q̇) + γ3·tanh(γ4·q̇) + γ5·q̇.
     #[default]
     Symmetric,
-    /// The same and a constant torque, as drives have whose friction depends on the direction.
+    /// Eq. 16 and a constant torque, as drives have whose friction depends on the direction.
     Asymmetric,
 }
 
@@ -77,7 +77,7 @@ impl Solution {
         (left / count, torque / count, rows)
     }
 
-    /// The same model on other reduced logs of the same arm and band: what it leaves of logs that took no
+    /// This model on other reduced logs of the same arm and band: what it leaves of logs that took no
     /// part in it.
     ///
     /// # Errors

@@ -136,7 +136,7 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 impl NormalEquations {
-    /// Of no row yet, for so many coefficients.
+    /// Of no row yet, for `size` coefficients.
     #[must_use]
     pub fn zero(size: usize) -> NormalEquations {
         NormalEquations { gram: Mat::zeros(size, size), right: vec![0.0; size], square: 0.0 }
@@ -196,7 +196,7 @@ impl NormalEquations {
         self.solver(|_| true).solve(&self.right)
     }
 
-    /// Σ w·(y − A·θ)², as far as rounding lets it be told from zero.
+    /// Σ w·(y − A·θ)², as far as rounding lets it be distinguished from zero.
     #[must_use]
     pub fn left(&self, theta: &[f64]) -> f64 {
         let predicted = |i: usize| -> f64 { dot(self.gram.col_as_slice(i), theta) };

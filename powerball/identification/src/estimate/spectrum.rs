@@ -110,7 +110,8 @@ pub fn noise_floor(data: &Data<'_>) -> Vec<f64> {
     (0..data.dof()).map(of_joint).collect()
 }
 
-/// The same for one joint's torques along recordings of `rate` Hz.
+/// What measurement noise alone would leave in the band of one joint's torques, along recordings of `rate`
+/// Hz.
 pub(crate) fn noise_in_band(torques: &[&[f64]], band: &Band, rate: f64) -> f64 {
     let wider = Band::new(2.0 * band.cutoff, rate);
     let (share, between) = (band.white_share(rate), band.white_share_between(&wider, rate));

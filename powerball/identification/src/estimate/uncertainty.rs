@@ -1,5 +1,5 @@
 //! How well a fit is known, all coefficients together, and what they weigh along its logs: what a comparison
-//! of two fits needs beside their values.
+//! of two fits needs in addition to their values.
 //!
 //! Also here: standard errors under coloured noise.
 

@@ -1,8 +1,8 @@
 //! A fit by variable projection: linear parameters by weighted least squares, friction steepnesses by
 //! Gauss–Newton.
 //!
-//! It asks of its rows only their cross products at given steepnesses, so rows in memory and reduced logs are
-//! fitted alike.
+//! It requires of its rows only their cross products at given steepnesses, so rows in memory and reduced logs
+//! are fitted alike.
 //!
 //! Also here: the steepnesses γ2, γ4 of the tanh model; rows of a regression whose friction steepnesses are free, whatever they are
 //! kept in.
@@ -215,7 +215,7 @@ pub(super) fn tangent(g: f64, v: f64) -> f64 {
     slope(g, v, (g * v).tanh())
 }
 
-/// The same where t = tanh(γ·q̇) is known.
+/// As [`tangent`], where t = tanh(γ·q̇) is known.
 fn slope(g: f64, v: f64, t: f64) -> f64 {
     g * v * (1.0 - t * t)
 }
@@ -234,8 +234,8 @@ pub(super) fn first((low, high): (f64, f64)) -> [f64; 2] {
 }
 
 /// The pair of steepnesses that leaves the least on one joint, all else refitted, levels ≥ 0. Where `present`
-/// holds the joint's steepnesses, they are among those tried, with their tangents: a bend beside a step that
-/// is known is then not outdone by a second step that corrects the first.
+/// holds the joint's steepnesses, they are among those tried, with their tangents: a bend in addition to a
+/// step that is known is then not outdone by a second step that corrects the first.
 #[must_use]
 pub(super) fn search<R: SeparableRows>(
     rows: &R,
@@ -246,7 +246,7 @@ pub(super) fn search<R: SeparableRows>(
 ) -> [f64; 2] {
     let layout = rows.layout();
     let (lowest, highest) = rows.range(joint);
-    // The ends of the range are hardly told from straight lines and steps.
+    // The ends of the range can hardly be distinguished from straight lines and steps.
     let (low, high) = (5.0 * lowest, 0.5 * highest);
     let mut steep: Vec<f64> =
         (0..GRID).map(|k| low * (high / low).powf(k as f64 / (GRID - 1) as f64)).collect();
@@ -389,7 +389,7 @@ pub(super) struct Trials {
 pub(super) trait SeparableRows: Sync {
     /// The columns at given steepnesses.
     type At;
-    /// Their order.
+    /// The order of the columns.
     fn layout(&self) -> Layout;
     /// Whether a joint has rows.
     fn moves(&self, joint: usize) -> bool;
@@ -399,7 +399,7 @@ pub(super) trait SeparableRows: Sync {
     fn power(&self, joint: usize) -> f64;
     /// The columns at γ2, γ4 of each joint.
     fn at(&self, shapes: &[[f64; 2]]) -> Self::At;
-    /// Their normal equations, summed over joints.
+    /// The normal equations of columns, summed over joints.
     fn products(&self, at: &Self::At, weights: &[f64]) -> NormalEquations;
     /// Cross products of one joint's columns tanh(γ·q̇) for some γ with all others, with each other and with
     /// the torque.

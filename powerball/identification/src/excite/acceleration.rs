@@ -8,8 +8,8 @@ use dyngen::{Arm, Evaluator, Function, Model, SetKind};
 const SHARE: f64 = 0.5;
 
 /// The arm with an acceleration limit for every joint that has a torque limit but none of acceleration: half of its torque
-/// over the largest B_ii of poses within its positions; and what is to be said of that. Where the masses are not known,
-/// the arm as it is.
+/// over the largest B_ii of poses within its positions; and what is to be reported about that. Where the
+/// masses are not known, the arm as it is.
 ///
 /// # Errors
 /// As [`Masses::parse`].

@@ -1,4 +1,4 @@
-//! What a path must keep beside its joints' limits: torque, floor, and its own links.
+//! What a path must keep in addition to its joints' limits: torque, floor, and its own links.
 //!
 //! Also here: what the joints may do, from the arm file; what stands around an arm; capsules.
 
@@ -15,7 +15,7 @@ use powerball_logs::motion::Motion;
 const RATE: f64 = 50.0;
 /// What the search keeps beyond the clearance for that, m.
 const BETWEEN: f64 = 2e-3;
-/// The same for torques, as a share of the limit.
+/// As [`BETWEEN`], for torques, as a share of the limit.
 const TORQUE_BETWEEN: f64 = 0.01;
 
 /// The capsules of an arm, and how far they are to stay apart.
@@ -230,9 +230,9 @@ impl Limits {
 
 // What stands around an arm: the floor, and the arm's own links as capsules.
 
-/// Radius of the links' capsules, m, where nothing is said.
+/// Radius of the links' capsules, m, where none is given.
 pub const RADIUS: f64 = 0.06;
-/// The distance that capsules keep from each other and from the floor, m, where nothing is said.
+/// The distance that capsules keep from each other and from the floor, m, where none is given.
 pub const CLEARANCE: f64 = 0.02;
 
 /// A floor at its base that blocks more than this share of an arm's poses is not what it was built on.
@@ -242,8 +242,8 @@ const HANGS: f64 = 0.95;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FloorAt(pub Option<f64>);
 
-/// The links and the floor of an arm in a mounting, and the floor's height: at the base where nothing is said
-/// of it, the base stands upright and the arm can be above it, as an arm that is below its base wherever it
+/// The links and the floor of an arm in a mounting, and the floor's height: at the base where none is given,
+/// the base stands upright and the arm can be above it, as an arm that is below its base wherever it
 /// is hangs over something.
 #[must_use]
 pub fn surroundings(

@@ -47,7 +47,7 @@ pub enum Error {
     /// No path was found that keeps all constraints: where the best one breaks them.
     #[error("no trajectory was found that keeps all constraints; in the best one {0}")]
     NoPath(String),
-    /// The arm cannot stand where it is said to be before the trajectory.
+    /// The arm cannot stand at the stated pose before the trajectory.
     #[error("the arm cannot stand at --from, base {mounting}: {why}")]
     NoStart {
         /// How the base stands.

@@ -47,7 +47,7 @@ pub struct Settings {
 /// of its own.
 pub const SEARCH: usize = 12_000;
 
-/// How many searches share so many evaluations.
+/// How many searches share this many evaluations.
 #[must_use]
 pub fn searches(evaluations: usize) -> usize {
     (evaluations / SEARCH).max(1)
@@ -75,7 +75,7 @@ impl Default for Settings {
 pub struct Excitation {
     /// The paths.
     pub paths: Vec<Fourier>,
-    /// Their figures, together.
+    /// The figures of all paths together.
     pub figures: Figures,
     /// The figures of the middle one of the random starts, for comparison.
     pub usual: Figures,
@@ -105,7 +105,7 @@ struct Judged<J> {
     paths: Vec<Candidate>,
     violation: f64,
     value: f64,
-    /// What was said of them; nothing where they break the constraints and were not asked about.
+    /// What `judge` returned for them; nothing where they break the constraints and were not judged.
     said: Option<J>,
 }
 
@@ -183,8 +183,8 @@ pub fn optimise_all(tasks: &[Task<'_>], kind: SetKind, settings: &Settings) -> R
     best.map(|(_, found)| found).ok_or_else(|| refused.unwrap_or(Error::NoPose))
 }
 
-/// The path within the limits whose value, the first thing that `judge` says, is smallest; what else it said
-/// of that path, and of the middle one of the random starts.
+/// The path within the limits whose value, the first result of `judge`, is smallest; the other results
+/// for that path, and of the middle one of the random starts.
 ///
 /// # Errors
 /// As [`search_all`].
@@ -199,7 +199,7 @@ pub fn search<J: Clone>(
 }
 
 /// The paths, one for each mounting within its constraints, whose value together is smallest, with what else
-/// `judge` said of them, and of the middle ones of the random starts.
+/// `judge` returned for them, and of the middle ones of the random starts.
 ///
 /// # Errors
 /// Settings that make no sense, [`Error::NoPose`] where there is no room at all, and [`Error::NoPath`] where

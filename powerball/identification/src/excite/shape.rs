@@ -142,8 +142,8 @@ impl Shape {
         shape
     }
 
-    /// Links that touch in every pose, from 1: their capsules are thicker than the arm, and nothing is said
-    /// of them.
+    /// Links that touch in every pose, from 1: their capsules are thicker than the arm, and nothing is
+    /// reported about them.
     #[must_use]
     pub fn always_touching(&self) -> &[(usize, usize)] {
         &self.always
@@ -238,7 +238,7 @@ fn segment(part: &Part, vertices: &[Vector3<f64>]) -> Segment {
     Segment { from: vertices[part.vertex], to: vertices[part.vertex + 1] }
 }
 
-/// The same random poses within the limits every time.
+/// Random poses within the limits, the same ones every time.
 pub(super) fn poses(limits: &[JointLimits]) -> impl Iterator<Item = Vec<f64>> + '_ {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     (0..POSES).map(move |_| {

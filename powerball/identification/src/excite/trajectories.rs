@@ -30,14 +30,14 @@ pub struct ExciteOptions<'a> {
     pub masses: Option<MassSource>,
     /// The pose before the trajectory, rad: the straight way from there to its beginning is kept free too.
     pub from: Option<Vec<f64>>,
-    /// Who is told what is being done.
+    /// Where progress is reported.
     pub progress: Progress<'a>,
 }
 
 /// How floor and links are looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Collision {
-    /// The floor; where nothing is said it is at 0 where the base stands upright and the arm can be above it,
+    /// The floor; where none is given it is at 0 where the base stands upright and the arm can be above it,
     /// and there is none elsewhere.
     pub floor: Option<FloorAt>,
     /// Radius of the links' capsules, m.
@@ -86,7 +86,7 @@ impl Default for ExciteOptions<'_> {
 pub struct Trajectory {
     /// How the base stands for it.
     pub mounting: Mounting,
-    /// Its samples.
+    /// The trajectory's samples.
     pub motion: Motion,
     /// Where it is nearest to what it must keep.
     pub tightest: Tightest,
@@ -96,7 +96,7 @@ pub struct Trajectory {
     pub constraints: Constraints,
 }
 
-/// Trajectories, and all that is told of their search.
+/// Trajectories, and all that is reported about their search.
 #[derive(Clone, Debug)]
 pub struct Excited {
     /// The arm's name.
@@ -219,7 +219,7 @@ fn tasks<'m>(
             ));
             for (a, b) in shape.always_touching() {
                 assumed.push(format!(
-                    "links {a} and {b} touch in every pose with this radius: nothing is said of them"
+                    "links {a} and {b} touch in every pose with this radius: their distance is not checked"
                 ));
             }
         }

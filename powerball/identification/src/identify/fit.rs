@@ -28,7 +28,7 @@ pub(super) struct Fitted {
     pub bands: Vec<usize>,
 }
 
-/// From this share of doubted samples on a joint is told of.
+/// From this share of doubted samples on, a joint is reported.
 const DOUBTED: f64 = 0.01;
 
 /// Fits what was gathered.
@@ -79,7 +79,7 @@ const MOTOR_TURN: f64 = 2.6;
 /// The share of the velocities' power that says how fast a motion is.
 const MOST_POWER: f64 = 0.99;
 
-/// What a model says of logs: the validation set where there is one. Empty where there are no logs.
+/// What a model predicts for logs: the validation set where there is one. Empty where there are no logs.
 #[derive(Clone, Debug, Default)]
 pub struct Along {
     /// Measured torque and error, by joint.
@@ -101,22 +101,22 @@ pub struct Along {
 pub struct JointAlong {
     /// Time along the logs, s, and position, rad or m; not a number between logs.
     pub position: Vec<(f64, f64)>,
-    /// The same for velocities, rad/s or m/s.
+    /// Time along the logs, s, and velocity, rad/s or m/s; not a number between logs.
     pub velocity: Vec<(f64, f64)>,
     /// Velocity, and what torque is left for friction, N·m.
     pub friction: Vec<(f64, f64)>,
     /// The error by cycles a turn of the joint.
     pub by_joint: Turns,
-    /// The same where the file has a gear ratio, up to a few cycles a turn of the motor.
+    /// The error up to a few cycles a turn of the motor, where the file has a gear ratio.
     pub by_motor: Turns,
 }
 
 /// What a log is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LogFacts {
-    /// Its name, without folders.
+    /// The log's name, without folders.
     pub name: String,
-    /// Its duration, s.
+    /// Duration, s.
     pub seconds: f64,
     /// Samples.
     pub samples: usize,

@@ -42,7 +42,7 @@ impl Mounted {
         Ok(Mounted::of(RigidArm::mounted(&mounted, arm)?, mounting, options))
     }
 
-    /// The same for a body that is there already.
+    /// As [`Mounted::new`], for a body that is there already.
     pub(crate) fn of(body: RigidArm, mounting: Mounting, options: &DataOptions) -> Mounted {
         let bands = Bands::new(&body, options);
         Mounted { mounting, body, bands, logs: Vec::new(), held_out: Vec::new(), doubts: Vec::new() }
@@ -63,7 +63,7 @@ pub(crate) struct Gathered {
     pub elsewhere: Vec<Mounted>,
     /// All fitted logs, where there are several mountings.
     pub together: Option<Together>,
-    /// What is to be said of the logs.
+    /// What is to be reported about the logs.
     pub warnings: Vec<String>,
     /// What the columns are, where they were asked before something was taken out of them.
     pub conventions: Option<Conventions>,
@@ -123,7 +123,7 @@ impl Gathered {
         Some(conventions(body, logs, held_out))
     }
 
-    /// What the logs that hold two torques say of the transmissions, however the base stood.
+    /// What the logs that hold two torques show about the transmissions, however the base stood.
     pub(crate) fn transmission(&self, progress: Progress<'_>) -> Option<Vec<JointTransmission>> {
         let all = || self.mounted.iter().chain(&self.elsewhere);
         let fitted: Vec<&Log> = all().flat_map(|m| &m.logs).collect();
@@ -344,7 +344,7 @@ impl<'a> Gathering<'a> {
     }
 }
 
-/// What is to be said of joints that rested.
+/// What is to be reported about joints that rested.
 fn rest_notes(arm: &Arm, summary: &Summary, kept: &[Log]) -> Vec<String> {
     let inactive = if kept.is_empty() { Vec::new() } else { inactive_joints(arm, kept) };
     let note = |(j, octaves): (usize, &Octaves)| {
@@ -364,7 +364,7 @@ fn rest_notes(arm: &Arm, summary: &Summary, kept: &[Log]) -> Vec<String> {
 pub(crate) struct InMemory {
     /// The arm of the file with the model's changes.
     pub arm: Arm,
-    /// The same, mounted as for the logs.
+    /// That arm, mounted as for the logs.
     pub body: RigidArm,
     pub fit: Vec<Log>,
     pub validate: Vec<Log>,

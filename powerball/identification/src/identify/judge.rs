@@ -143,8 +143,8 @@ fn errors(
         let joints: Vec<String> = joints.iter().map(ToString::to_string).collect();
         warnings.push(format!(
             "one set of parameters leaves more than twice as much of the logs with the base {} on joint {} \
-                as a set of their own: is the mounting of each log told right, and was it one arm with one \
-                load?",
+                as a set of their own: is the mounting of each log stated correctly, and was it one arm with \
+                one load?",
             mounted.mounting,
             joints.join(", ")
         ));
@@ -158,7 +158,7 @@ fn errors(
 const POOR: f64 = 0.5;
 /// Friction of two directions helps a poor joint where its error falls to this share,
 const HELPS: f64 = 0.7;
-/// and does not where another joint's grows to so many times.
+/// and does not where another joint's grows to this many times.
 const HARMS: f64 = 1.1;
 
 /// What `--friction asymmetric` would do to a fit that leaves more than half of a joint's torque; `None` where nothing is

@@ -127,7 +127,7 @@ fn gather_logs(
     Ok(gathered)
 }
 
-/// What is told of a fit.
+/// What is reported about a fit.
 fn conclude(
     gathered: &Gathered,
     fitted: &Fitted,
@@ -193,7 +193,7 @@ pub struct IdentifyOptions<'a> {
     pub data: DataOptions,
     /// What is known already: taken out of the logs as it stands. Logs of one mounting alone, no summaries.
     pub known: Option<&'a dyn KnownModel>,
-    /// Who is told what is being done.
+    /// Where progress is reported.
     pub progress: Progress<'a>,
 }
 
@@ -203,8 +203,8 @@ pub enum Estimator {
     /// Least squares, every joint weighted by its noise.
     #[default]
     Weighted,
-    /// The same, and torque samples that the model cannot believe (knocks, spikes, brief collisions) count
-    /// less or nothing.
+    /// Weighted least squares in which torque samples that the model cannot believe (knocks, spikes, brief
+    /// collisions) count less or nothing.
     Robust,
     /// Instrumental variables: unbiased where positions are noisy. The regressor from every second sample of
     /// the positions, its instruments from those between.

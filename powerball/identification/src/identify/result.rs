@@ -54,7 +54,7 @@ pub struct Identified {
     pub joint_bands: Vec<f64>,
     /// Why these, in words.
     pub band_reason: String,
-    /// What is to be said of the logs, the arm file and the fit.
+    /// What is to be reported about the logs, the arm file and the fit.
     pub warnings: Vec<String>,
     /// What would lower errors that are large now, where something is known to.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -82,7 +82,7 @@ impl Identified {
     }
 }
 
-/// What to say of parameters that the logs do not determine.
+/// What to report about parameters that the logs do not determine.
 pub(super) fn undetermined(parameters: &[ParameterEstimate]) -> Option<String> {
     let names: Vec<&str> = parameters.iter().filter(|p| p.std.is_none()).map(|p| p.name.as_str()).collect();
     (!names.is_empty()).then(|| {
@@ -130,7 +130,7 @@ pub enum IdentifyError {
     /// A file is among the logs to fit and among those to judge by.
     #[error("{0} is given to --log and --validate: a log cannot judge its own fit")]
     JudgesItself(String),
-    /// Logs that cannot be used as they are: unreadable, damaged, of another arm, given twice, told of a
+    /// Logs that cannot be used as they are: unreadable, damaged, of another arm, given twice, stated with a
     /// wrong mounting. Every reason.
     #[error("{}", .0.join("\n"))]
     Unusable(Vec<String>),

@@ -37,7 +37,7 @@ fn normal(products: &Products, columns: &[Column], noise: f64, sign: f64) -> Nor
 }
 
 impl FittedLaw {
-    /// Of the widths, and of `options` beside what is `fixed`, those that leave the least.
+    /// Of the widths, and of `options` in addition to what is `fixed`, those that leave the least.
     pub(super) fn best(
         products: &Products,
         noise: f64,

@@ -12,7 +12,7 @@
 //! |---|---|
 //! | `products` | logs on even grids; the signals that a motor's torque is compared with, and their products by block |
 //! | `fit` | ratio and friction from products; standard errors |
-//! | `search` | what a transmission may hold beside friction and rotor, and which of it is there, judged on logs that took no part in a fit |
+//! | `search` | what a transmission may hold in addition to friction and rotor, and which of it is there, judged on logs that took no part in a fit |
 
 mod fit;
 mod products;
@@ -31,7 +31,7 @@ use serde::Serialize;
 /// The transmission of each joint from the logs that hold both torques, judged on those of `validate`;
 /// without them parts of the logs judge each other. `None` where no log holds the motors' torques.
 ///
-/// Nothing fails: of a joint whose transmission the logs do not tell it is said why.
+/// Nothing fails: for a joint whose transmission the logs do not determine the reason is given.
 #[must_use]
 pub fn transmission<'l>(
     arm: &Arm,
@@ -47,7 +47,8 @@ pub fn transmission<'l>(
     }
     // Where only logs to judge on hold both, these are fitted.
     let fitted = if fitted == 0 { all.len() } else { fitted };
-    // Beside a motor's torque stands what its gear gives, which where joints are coupled is not one joint's.
+    // A motor's torque is compared with what its gear gives, which where joints are coupled is not one
+    // joint's.
     let grid = Grid::new(&logs_of_motors(arm, &all), fitted);
     let inactive = inactive_joints(arm, &all);
     let joints: Vec<usize> = (0..arm.dof()).collect();
@@ -65,7 +66,7 @@ pub fn transmission<'l>(
     }))
 }
 
-/// A joint's transmission, or why it is not told.
+/// A joint's transmission, or why it is not determined.
 fn of_joint(arm: &Arm, grid: &Grid, joint: JointNumber) -> Result<Transmission, String> {
     let (evidence, scales) = products::evidence(arm, grid, joint)?;
     let base = search::base(&evidence, joint)?;
@@ -76,7 +77,7 @@ fn of_joint(arm: &Arm, grid: &Grid, joint: JointNumber) -> Result<Transmission, 
 
 // The result, and its words: the `transmission` of identified.json and explained.json.
 
-/// What the logs say of a joint's transmission.
+/// What the logs show about a joint's transmission.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum JointTransmission {
@@ -118,10 +119,10 @@ pub struct Transmission {
     pub offset: f64,
     /// Share of the motor torque's rms that stays on logs that were not fitted.
     pub left: f64,
-    /// The same with the effects.
+    /// That share with the effects.
     pub left_with: f64,
-    /// What was found beside friction and rotor, in the order in which it was found. Ratio, friction and
-    /// rotor are those beside these.
+    /// What was found in addition to friction and rotor, in the order in which it was found. Ratio, friction
+    /// and rotor are those fitted together with these.
     pub effects: Vec<TransmissionEffect>,
 }
 
@@ -135,13 +136,13 @@ impl JointTransmission {
         }
     }
 
-    /// What is told, in a line.
+    /// The result, in a line.
     #[must_use]
     pub fn sentence(&self) -> String {
         match self {
             JointTransmission::Known(result) => result.sentence(),
             JointTransmission::Unknown(Unknown { joint, why_not }) => {
-                format!("transmission of joint {joint}: not told: {why_not}")
+                format!("transmission of joint {joint}: not determined: {why_not}")
             }
         }
     }

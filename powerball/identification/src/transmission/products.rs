@@ -1,4 +1,4 @@
-//! What the logs say of one joint's transmission: products of its columns, by block.
+//! What the logs show about one joint's transmission: products of its columns, by block.
 //!
 //! Also here: the signals that a motor's torque is compared with; logs with both torques on even grids, and which part
 //! each belongs to.
@@ -32,7 +32,7 @@ pub(super) struct Block {
     pub products: Products,
 }
 
-/// Everything that a joint's transmission is told by.
+/// Everything that a joint's transmission is determined from.
 #[derive(Debug)]
 pub(super) struct Evidence {
     pub blocks: Vec<Block>,
@@ -100,7 +100,7 @@ impl Evidence {
     }
 }
 
-/// What the logs say of a joint.
+/// What the logs show about a joint.
 ///
 /// # Errors
 /// In words, where they say nothing.
@@ -248,7 +248,7 @@ impl Column {
         all
     }
 
-    /// Its place among all.
+    /// The column's place among all.
     pub(super) fn index(self) -> usize {
         let loads = 6 + Self::WIDTHS;
         let presliding = loads + Self::WIDTHS;

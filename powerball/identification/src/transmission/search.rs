@@ -1,6 +1,6 @@
 //! Which effects a transmission holds, judged on logs that took no part in a fit.
 //!
-//! Also here: what a transmission may hold beside friction and rotor.
+//! Also here: what a transmission may hold in addition to friction and rotor.
 
 use super::Transmission;
 use super::fit::{FittedLaw, noise_share};
@@ -22,7 +22,7 @@ const SAME_RATIO: f64 = 0.2;
 const LEVEL: f64 = 1e-4;
 /// Effects on one joint at most.
 const MOST: usize = 3;
-/// Another effect that leaves no more than so many times what the chosen one leaves could be there in its
+/// Another effect that leaves no more than this many times what the chosen one leaves could be there in its
 /// place.
 const AS_GOOD: f64 = 1.1;
 /// Where more of a motor's torque stays, it is not this joint's: less than half of its square is explained.
@@ -50,7 +50,7 @@ fn held_out(evidence: &Evidence, fixed: &[Candidate], options: &[Candidate]) -> 
 /// Ratio, rotor and friction alone.
 ///
 /// # Errors
-/// In words, where the motor's torque is not that of the joint, or the ratio is not told.
+/// In words, where the motor's torque is not that of the joint, or the ratio is not determined.
 pub(super) fn base(evidence: &Evidence, joint: JointNumber) -> Result<FittedLaw, String> {
     let all = evidence.of(|_| true);
     if noise_share(&all, evidence.noise) > NOISE {
@@ -102,7 +102,7 @@ pub(super) fn search(evidence: &Evidence) -> Vec<Found> {
     found
 }
 
-/// The best effect beside others, where one passes.
+/// The best effect in addition to others, where one passes.
 fn step(evidence: &Evidence, fixed: &[Candidate]) -> Option<Found> {
     let before = held_out(evidence, fixed, &[])?;
     let others = Kind::ALL.into_iter().filter(|kind| fixed.iter().all(|f| f.kind != *kind));
@@ -145,7 +145,7 @@ fn sure(evidence: &Evidence, fixed: &[Candidate], kind: Kind) -> Option<Candidat
     (agrees && last.abs() > error * critical(evidence, whole.columns.len())).then_some(candidate)
 }
 
-/// What is told of a joint, torques at the link in `unit`.
+/// What is reported about a joint, torques at the link in `unit`.
 pub(super) fn tell(
     evidence: &Evidence,
     scales: &Scales,
@@ -178,7 +178,7 @@ pub(super) fn tell(
     }
 }
 
-// What a transmission may hold beside friction and rotor.
+// What a transmission may hold in addition to friction and rotor.
 
 /// Figures of an effect by name, SI units.
 pub type Figures = BTreeMap<&'static str, f64>;
@@ -186,9 +186,9 @@ pub type Figures = BTreeMap<&'static str, f64>;
 /// An effect of a joint's transmission.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TransmissionEffect {
-    /// Its name.
+    /// The effect's name.
     pub effect: &'static str,
-    /// Its figures, at the link.
+    /// The effect's figures, at the link.
     pub parameters: Figures,
     /// By which share the squared error on logs that were not fitted falls, by direction: which part of the
     /// logs was held out.
@@ -199,7 +199,7 @@ pub struct TransmissionEffect {
 }
 
 impl TransmissionEffect {
-    /// Its name with its figures.
+    /// The effect's name with its figures.
     #[must_use]
     pub fn in_words(&self) -> String {
         let figures: Vec<String> =
@@ -263,7 +263,7 @@ impl Kind {
 }
 
 impl Candidate {
-    /// Its column beside Coulomb friction of a width.
+    /// The candidate's column, with Coulomb friction of a width.
     pub(super) fn column(self, width: usize) -> Column {
         match self.kind {
             Kind::LoadFriction => Column::Load(width),
@@ -274,7 +274,7 @@ impl Candidate {
         }
     }
 
-    /// Its figures, for a coefficient at the link.
+    /// The effect's figures, for a coefficient at the link.
     pub(super) fn figures(self, scales: &Scales, coefficient: f64) -> Figures {
         let list = match self.kind {
             Kind::LoadFriction => vec![("coefficient", coefficient)],

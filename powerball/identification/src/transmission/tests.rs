@@ -46,8 +46,8 @@ static LOGS: LazyLock<(Arm, Vec<(Motion, Log)>)> = LazyLock::new(|| {
     (lwa4p::arm().unwrap(), (0..6).map(log).collect())
 });
 
-/// What is told of logs with the motors' torques of [`TRUTH`], with what `extra` gives of a joint along a log
-/// on top, N·m at the link, and white noise of `noise` N·m on the link's torques.
+/// What is reported about logs with the motors' torques of [`TRUTH`], with what `extra` gives of a joint
+/// along a log on top, N·m at the link, and white noise of `noise` N·m on the link's torques.
 fn result(extra: impl Fn(usize, &Motion, &Log) -> Option<Vec<f64>>, noise: f64) -> Vec<JointTransmission> {
     let (arm, logs) = &*LOGS;
     let mut rng = ChaCha8Rng::seed_from_u64(3);

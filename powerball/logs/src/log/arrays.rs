@@ -25,7 +25,7 @@ pub struct Arrays<'a> {
     pub velocity: &'a [Vec<f64>],
     /// Temperatures, °C.
     pub temperature: &'a [Vec<f64>],
-    /// Torques on the motors' side of the gears, in any unit: kept beside the torques.
+    /// Torques on the motors' side of the gears, in any unit: kept in addition to the torques.
     pub motor: &'a [Vec<f64>],
 }
 
@@ -69,8 +69,8 @@ impl Log {
         Log::from_columns(name, arm, &columns)
     }
 
-    /// The same from samples one after the other. Which quantities there are is said by the first one; a
-    /// sample that lacks one of them has a hole there.
+    /// As [`Log::from_arrays`], from samples one after the other. The first one determines which quantities
+    /// there are; a sample that lacks one of them has a hole there.
     ///
     /// # Errors
     /// As [`Log::from_arrays`].
@@ -97,7 +97,8 @@ impl Log {
         Log::from_arrays(name, arm, &Arrays { t: &t, q, torque, current, velocity, temperature, motor })
     }
 
-    /// The same from columns named as in a file: `t`, `q1` …, `tau1` … or `i1` …, `dq1` …, `temp1` ….
+    /// As [`Log::from_arrays`], from columns named as in a file: `t`, `q1` …, `tau1` … or `i1` …, `dq1` …,
+    /// `temp1` ….
     ///
     /// # Errors
     /// As [`Log::from_arrays`].
@@ -109,7 +110,7 @@ impl Log {
         Log::from_columns_as(name, arm, columns, &ColumnMap::default())
     }
 
-    /// The same with what a map says of the columns.
+    /// As [`Log::from_columns`], with a map of the columns.
     ///
     /// # Errors
     /// As [`Log::from_arrays`].

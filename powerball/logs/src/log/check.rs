@@ -12,7 +12,7 @@ use std::ops::Range;
 /// A step between samples longer than this, s, or than [`GAP_STEPS`] median steps, is a gap.
 const GAP: f64 = 0.1;
 const GAP_STEPS: f64 = 5.0;
-/// So many of a log's gaps and jumps are named one by one.
+/// At most this many of a log's gaps and jumps are named one by one.
 const SPLITS_SHOWN: usize = 5;
 /// Time stamps that do not rise: up to this share are left out, more make the log unusable.
 const MOST_STALE: f64 = 0.05;
@@ -183,7 +183,7 @@ fn pieces(
         let gap = raw.t[k] - raw.t[k - 1];
         let jump = (0..arm.dof()).find(|&j| (raw.q[j][k] - raw.q[j][k - 1]).abs() > farthest(arm, j, gap));
         if restarts.iter().any(|t| raw.t[k - 1] < *t && *t <= raw.t[k]) {
-            // That has been said.
+            // That was reported.
         } else if gap > GAP.max(GAP_STEPS * step) {
             let message =
                 format!("at {:.3} s: a gap of {gap:.3} s: the log is used as two pieces", raw.t[k - 1]);

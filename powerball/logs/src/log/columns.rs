@@ -28,8 +28,8 @@ const NAMES: [(&str, &[&str]); 6] = [
     ("temp", &["temp", "temperature"]),
     ("motor", &["motor"]),
 ];
-/// The same in recordings of Universal Robots' RTDE, which count joints from 0; its torques by current are those that
-/// controllers from 5.23 on give.
+/// The names in recordings of Universal Robots' RTDE, which count joints from 0; the torques by current are
+/// those that controllers from 5.23 on give.
 const RTDE: [(&str, &str); 5] = [
     ("q", "actual_q_"),
     ("dq", "actual_qd_"),
@@ -40,7 +40,7 @@ const RTDE: [(&str, &str); 5] = [
 /// Names of the time; the first is that of this project's own logs. Lines with a header have that one alone.
 pub(super) const TIMES: [&str; 3] = ["t", "time", "timestamp"];
 
-/// What LeRobot does not say of positions.
+/// What LeRobot does not state about positions.
 const UNIT_OF_LEROBOT: &str = "LeRobot does not say in which unit observation.state is: rad, degrees from the middle of a \
     servo's range, or a share of that range from -100 to 100. Say it with --map 'q.unit = \"deg\"' (or \"rad\"); a share of \
     the range is no angle before it is multiplied by the range ('q.scale = […]')";
@@ -63,7 +63,7 @@ impl Group {
 }
 
 impl Group {
-    /// Its columns, moved out of those of a table; the last use of one takes it.
+    /// The group's columns, moved out of those of a table; the last use of one takes it.
     fn take(&self, values: &mut [Vec<f64>], uses: &mut [usize]) -> Vec<Vec<f64>> {
         let one = |(at, factor): (&usize, &f64)| {
             uses[*at] -= 1;
@@ -251,7 +251,7 @@ impl Columns {
                 }
                 Err(reason) => errors.push(finding("i", reason)),
             },
-            // Where the joints' names are not the arm's, that has been said.
+            // Where the joints' names are not the arm's, that was reported.
             (Err(_), Err(_)) if q.is_err() && !logged_joints(names, asked.map).is_empty() => {}
             (Err(tau), Err(current)) => {
                 let missing = if tau.len() <= current.len() { tau } else { current };
@@ -288,7 +288,8 @@ impl Columns {
         if let Some(motor) = &columns.motor {
             let shown: Vec<&str> = motor.at.iter().map(|k| names[*k].as_str()).collect();
             let message = format!(
-                "kept beside the torques, for the transmission of each joint, and no part of the arm's fit: {}",
+                "kept in addition to the torques, for the transmission of each joint, and no part of the \
+                 arm's fit: {}",
                 shown.join(", ")
             );
             findings.push(finding("motor", message));

@@ -38,8 +38,8 @@ impl LogFile {
         Self::create_for(path, &[])
     }
 
-    /// The same with the names that an MCAP gives the joints, in chain order; `joint1` and so on where there are
-    /// none.
+    /// As [`LogFile::create`], with the names that an MCAP gives the joints, in chain order; `joint1` and so
+    /// on where there are none.
     ///
     /// # Errors
     /// As [`LogFile::create`].
@@ -119,7 +119,7 @@ impl Made {
             .map(|m| m.1)
     }
 
-    /// The number of rows; an MCAP gets its layouts beside it.
+    /// The number of rows; an MCAP gets its layouts next to it.
     fn convert(self, lines: File, joints: &[String], out: File, target: &Path) -> io::Result<usize> {
         match self {
             Made::Parquet => crate::tables::columnar::from_csv(lines, out),
@@ -188,7 +188,7 @@ impl Log {
         self.write_for(path, &[])
     }
 
-    /// The same with the names that an MCAP gives the joints.
+    /// As [`Log::write`], with the names that an MCAP gives the joints.
     ///
     /// # Errors
     /// As [`Log::write`].
@@ -307,7 +307,7 @@ mod tests {
         let recovered = recovered.unwrap();
         assert_eq!(recovered, folder.join("a.interrupted-1.parquet"));
         assert_eq!(read(&recovered).t.len(), 500);
-        // Nothing was recorded: that is said, and what was there stays.
+        // Nothing was recorded: that is reported, and what was there stays.
         assert!(log.close().unwrap_err().to_string().contains("nothing was recorded"));
         assert!(begin(&csv).0.close().is_err());
         assert_eq!((read(&parquet).t.len(), read(&csv).t.len()), (70_000, 70_000));

@@ -10,7 +10,7 @@ use dyngen::Arm;
 use serde::Serialize;
 use std::path::Path;
 
-/// A step longer than this many median steps is told as a gap.
+/// A step longer than this many median steps is reported as a gap.
 const GAP_STEPS: f64 = 5.0;
 /// Angles beyond this, rad, are degrees.
 const FAR: f64 = 4.0 * std::f64::consts::PI;
@@ -18,11 +18,11 @@ const FAR: f64 = 4.0 * std::f64::consts::PI;
 /// A file as `powerball log` shows it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Inspected {
-    /// Its name.
+    /// The file's name.
     pub file: String,
     /// How it is stored.
     pub format: Format,
-    /// Its tables: one, or one a topic.
+    /// The file's tables: one, or one a topic.
     pub tables: Vec<InspectedTable>,
     /// How the topics that hold numbers lie in time, two by two.
     pub alignment: Vec<Aligned>,
@@ -41,7 +41,7 @@ pub struct Inspected {
 /// One table of a file.
 #[derive(Clone, Debug, Serialize)]
 pub struct InspectedTable {
-    /// Its topic; empty where the file has one table only.
+    /// The table's topic; empty where the file has one table only.
     pub name: String,
     /// The type of its messages, or what its samples are.
     #[serde(rename = "type")]
@@ -69,7 +69,7 @@ pub struct InspectedTable {
     pub not_rising: usize,
     /// The names of its joints, or their numbers, in the order of its columns.
     pub joints: Vec<String>,
-    /// Its columns.
+    /// The table's columns.
     pub columns: Vec<InspectedColumn>,
     /// The time of every sample, s, for figures; empty where there is no time.
     #[serde(skip)]
@@ -79,13 +79,13 @@ pub struct InspectedTable {
 /// One column of a table.
 #[derive(Clone, Debug, Serialize)]
 pub struct InspectedColumn {
-    /// Its name.
+    /// The column's name.
     pub name: String,
     /// What it is taken to be: `t`, `q`, `dq`, `tau`, `i`, `temp`, `motor`; none where it is left aside.
     pub quantity: Option<&'static str>,
     /// Of which joint.
     pub joint: Option<String>,
-    /// Its unit: said by the map, or guessed from its numbers.
+    /// The column's unit: given by the map, or guessed from the numbers.
     pub unit: Option<String>,
     /// The smallest value.
     pub min: Option<f64>,

@@ -31,7 +31,7 @@ pub enum Taken {
         /// Whether time fell back before it.
         restarted: bool,
     },
-    /// Its time does not rise.
+    /// The sample's time does not rise.
     Stale,
     /// A needed column has no finite number.
     Nothing,

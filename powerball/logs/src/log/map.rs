@@ -25,7 +25,7 @@ pub struct ColumnMap {
     /// The names that the log has for the arm's joints, in the order of the arm file; empty where they are
     /// those of the arm file.
     pub joints: Vec<String>,
-    /// The topic with all that is not said to be elsewhere.
+    /// The topic with all columns for which no other topic is given.
     pub topic: Option<String>,
     /// Which time counts.
     pub clock: Clock,
@@ -67,11 +67,11 @@ pub struct Mapped {
     pub column: Option<ByJoint<String>>,
     /// The topic that has it.
     pub topic: Option<String>,
-    /// Its unit; nothing is the one of docs/logs.md.
+    /// The column's unit; where none is given, that of docs/logs.md.
     pub unit: Option<ByJoint<String>>,
     /// 1 or −1.
     pub sign: Option<ByJoint<f64>>,
-    /// What the column is to be multiplied with, beside unit and sign.
+    /// What the column is to be multiplied with, in addition to unit and sign.
     pub scale: Option<ByJoint<f64>>,
     /// What is to be added to the column's time stamps, s: of torques and currents that are late it is
     /// negative.
@@ -82,7 +82,7 @@ pub struct Mapped {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(untagged)]
 pub enum ByJoint<T> {
-    /// The same for all.
+    /// One value for all joints.
     All(T),
     /// One a joint.
     Each(Vec<T>),
@@ -127,7 +127,7 @@ const CURRENTS: &[Unit] = &[(&["A"], 1.0), (&["mA"], 1e-3)];
 const TEMPERATURES: &[Unit] = &[(&["°C", "C", "degC"], 1.0)];
 
 impl ColumnMap {
-    /// The topics that the map names, where it names the one with all that is not said to be elsewhere.
+    /// The topics that the map names, where it names the one with all other columns.
     pub(super) fn topics(&self) -> Option<Vec<String>> {
         let main = self.topic.clone()?;
         let others = [&self.t, &self.q, &self.dq, &self.tau, &self.i, &self.temp, &self.motor];
@@ -147,7 +147,7 @@ impl ColumnMap {
         Ok(map)
     }
 
-    /// The map of all that was said: files, and lines of one such as `tau.sign = -1`.
+    /// The map of all that was given: files, and lines of one such as `tau.sign = -1`.
     ///
     /// # Errors
     /// As [`ColumnMap::parse`], and a file that cannot be read.
@@ -206,7 +206,7 @@ impl ColumnMap {
         }
     }
 
-    /// The same for columns that already have their plain names: units and signs alone.
+    /// This map for columns that already have their plain names: units and signs alone.
     pub(super) fn without_columns(&self) -> ColumnMap {
         let mut map = self.clone();
         for mapped in
@@ -223,7 +223,7 @@ pub(super) fn velocity_units() -> impl Iterator<Item = (&'static str, f64)> {
     VELOCITIES.iter().filter(|(_, factor)| *factor != 1.0).map(|(names, factor)| (names[0], *factor))
 }
 
-/// The unit of time in which samples are so far apart.
+/// The unit of time that the distance of samples implies.
 pub(super) fn time_unit(step: f64) -> &'static str {
     match step {
         step if step < SLOWEST => "s",

@@ -63,7 +63,7 @@ pub struct Doubt {
 }
 
 impl Log {
-    /// Its first and its second half by samples, as logs of their own.
+    /// The log's first and second half by samples, as logs of their own.
     #[must_use]
     pub fn halves(&self) -> [Log; 2] {
         let middle = self.t.len() / 2;
@@ -77,7 +77,7 @@ impl Log {
         self.pieces.iter().cloned().flatten().map(sample)
     }
 
-    /// Its first samples.
+    /// The log's first samples.
     #[must_use]
     pub fn cut(mut self, samples: usize) -> Log {
         let samples = samples.min(self.t.len());

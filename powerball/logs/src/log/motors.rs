@@ -106,7 +106,7 @@ pub fn logs_of_motors<'l>(arm: &Arm, logs: &'l [Log]) -> Cow<'l, [Log]> {
     }
 }
 
-/// What is to be said of an arm file before any log: its own notes, and whose the results are where a
+/// What is to be reported about an arm file before any log: its own notes, and whose the results are where a
 /// transmission couples joints.
 #[must_use]
 pub fn notes_of(arm: &Arm) -> Vec<String> {

@@ -19,7 +19,7 @@ pub fn read_logs<P: AsRef<Path>>(files: &[P], arm: &Arm) -> Result<(Vec<Log>, Ve
     read_logs_as(files, arm, &ColumnMap::default())
 }
 
-/// The same with what a map says of their columns.
+/// As [`read_logs`], with a map of their columns.
 ///
 /// # Errors
 /// Every reason why one of the logs cannot be used.
@@ -46,7 +46,7 @@ pub fn read_log(path: &Path, arm: &Arm, findings: &mut Vec<Finding>) -> Result<L
     read_log_as(path, arm, &ColumnMap::default(), findings)
 }
 
-/// The same with what a map says of its columns.
+/// As [`read_log`], with a map of its columns.
 ///
 /// # Errors
 /// As [`read_log`].
@@ -123,7 +123,7 @@ impl Log {
         Log::read_as(path, arm, &ColumnMap::default())
     }
 
-    /// The same with what a map says of its columns.
+    /// As [`Log::read`], with a map of its columns.
     ///
     /// # Errors
     /// As [`Log::read`].
@@ -173,7 +173,7 @@ impl Raw {
         }
     }
 
-    /// Makes room for so many more samples.
+    /// Makes room for `samples` more samples.
     fn expect(&mut self, samples: usize) {
         make_room(&mut self.line, samples);
         let motor = self.motor.iter_mut().flatten().chain(&mut self.dq);
@@ -283,7 +283,7 @@ impl<'a> Samples<'a> {
 impl Samples<'_> {
     /// Takes a whole table, whose columns become the log's without a copy; `time` is the time of its samples where no column is.
     pub(super) fn table(&mut self, table: Table, time: Option<Vec<f64>>) -> Result<(), LogError> {
-        // A message may have a `t` of its own beside the time that counts.
+        // A message may have a `t` of its own in addition to the time that counts.
         let own = |name: String| if time.is_some() && name == "t" { "t of the message".into() } else { name };
         let names = table.columns.iter().map(|column| own(column.name.clone()));
         self.begin(&time.iter().map(|_| "t".to_string()).chain(names).collect::<Vec<_>>())?;

@@ -210,12 +210,12 @@ fn slope(y: &[f64], x: &[f64]) -> (f64, f64) {
 
 // The levels of a signal: coarse steps, and tops that are flat because something saturates.
 
-/// A saturated signal rests at its extreme at least so many samples one after another.
+/// A saturated signal rests at its extreme for at least this many samples one after another.
 const FLAT: usize = 4;
 /// … and for this share of the log in all.
 const FLAT_SHARE: f64 = 2e-3;
-/// … and so many times more often than just below it: a signal that turns there is at most 2.4 times as often
-/// in its last step as in the one before.
+/// … and this many times more often than just below it: a signal that turns there is at most 2.4 times as
+/// often in its last step as in the one before.
 const PILED: f64 = 4.0;
 /// Fewer steps than these across what a signal covers are worth telling.
 const STEPS_POSITION: f64 = 500.0;
@@ -355,7 +355,7 @@ fn mean(x: &[f64]) -> Option<(f64, f64)> {
 /// What a finding means for the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Severity {
-    /// Its user should know.
+    /// The user should know.
     Warning,
     /// It cannot be used.
     Unusable,

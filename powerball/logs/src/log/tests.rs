@@ -257,7 +257,7 @@ fn swings(mut change: impl FnMut(usize, &mut [f64; 7])) -> String {
     text
 }
 
-/// What is said of a log: findings, or why it cannot be used.
+/// What is reported about a log: findings, or why it cannot be used.
 fn said(text: &str) -> Vec<String> {
     let (log, findings) = read(text);
     let errors = log.err().map(|e| e.0).unwrap_or_default();

@@ -191,7 +191,7 @@ impl<'a> Data<'a> {
         Ok(bands.into_iter().zip(joints).map(of_band).collect())
     }
 
-    /// The same rows with other signals: samples, band and blocks stay as they are.
+    /// These rows with other signals: samples, band and blocks stay as they are.
     #[must_use]
     pub fn seen_otherwise(&self, correct: impl FnMut(&mut Recording)) -> Data<'a> {
         let mut recordings = self.recordings.to_vec();
@@ -200,7 +200,7 @@ impl<'a> Data<'a> {
         self.with(Arc::new(recordings), joints)
     }
 
-    /// The same rows without a known torque, by joint and row, N·m.
+    /// These rows without a known torque, by joint and row, N·m.
     #[must_use]
     pub fn without_torque(&self, torque: &[Vec<f64>]) -> Data<'a> {
         let mut joints = self.joints.clone();
@@ -210,7 +210,7 @@ impl<'a> Data<'a> {
         Data { per_joint: self.per_joint, ..self.with(Arc::clone(&self.recordings), joints) }
     }
 
-    /// The same rows, recorded at other times: the common clock at the first sample of each recording, s.
+    /// These rows, recorded at other times: the common clock at the first sample of each recording, s.
     #[must_use]
     pub fn with_clocks(&self, clocks: &[f64]) -> Data<'a> {
         let mut recordings = self.recordings.to_vec();
@@ -218,7 +218,7 @@ impl<'a> Data<'a> {
         Data { per_joint: self.per_joint, ..self.with(Arc::new(recordings), self.joints.clone()) }
     }
 
-    /// The same rows with the columns of another arm: `count` parameters, and their columns along a recording,
+    /// These rows with the columns of another arm: `count` parameters, and their columns along a recording,
     /// samples × n × parameters.
     #[must_use]
     pub fn of_other_columns(&self, count: usize, columns: impl Fn(&Recording) -> Vec<f64>) -> Data<'a> {
@@ -235,7 +235,7 @@ impl<'a> Data<'a> {
         self.with(Arc::clone(&self.recordings), joints)
     }
 
-    /// The same data with other recordings and rows.
+    /// This data with other recordings and rows.
     pub(super) fn with(&self, recordings: Arc<Vec<Recording>>, joints: Vec<JointRows>) -> Data<'a> {
         Data {
             body: self.body,
@@ -289,7 +289,7 @@ impl<'a> Data<'a> {
         joints
     }
 
-    /// The same logs with some joints in narrower bands: `narrower` are the bands after this one, each made of
+    /// These logs with some joints in narrower bands: `narrower` are the bands after this one, each made of
     /// the one before, and `which` says by joint which of them, 0 for this one.
     #[must_use]
     pub fn with_narrower(mut self, narrower: &[Data<'_>], which: &[usize], block: f64) -> Data<'a> {
@@ -406,7 +406,7 @@ impl<'a> Data<'a> {
         arm.all_parameters().into_iter().filter(declared).collect()
     }
 
-    /// Their columns, in the same order.
+    /// Columns of the parameters that are declared zero, in the same order.
     pub fn declared_zero_columns(&self) -> &[Column] {
         self.declared_zero.get_or_init(|| {
             let chosen: Vec<usize> = self.declared_zero().iter().map(|p| p.index()).collect();

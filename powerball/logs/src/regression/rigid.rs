@@ -27,7 +27,7 @@ pub struct RigidArm {
     filed: [Rational; 3],
     /// The arm without its declared symmetries, all parameters apart: built when first asked for.
     unconstrained: OnceLock<Option<Wide>>,
-    /// The same at unit gravity along x, y and z of the base.
+    /// The arm at unit gravity along x, y and z of the base.
     unit_gravity: OnceLock<Option<[Wide; 3]>>,
     /// See [`RigidArm::gravity_unobservable`].
     gravity_unobservable: OnceLock<Vec<Vec<f64>>>,
@@ -67,7 +67,7 @@ impl RigidArm {
         RigidArm::mounted(arm, arm)
     }
 
-    /// The same for an arm under another gravity than that of its file.
+    /// As [`RigidArm::new`], for an arm under another gravity than that of its file.
     ///
     /// # Errors
     /// As [`RigidArm::new`].
@@ -142,7 +142,7 @@ impl RigidArm {
         out
     }
 
-    /// The same into a slice of n × p numbers a sample.
+    /// As [`Self::regressor`], into a slice of n × p numbers a sample.
     pub fn regressor_into(&self, q: &[f64], v: &[f64], a: &[f64], out: &mut [f64]) {
         let [q, v, a] = self.of_joints([q, v, a]);
         self.regressor.evaluate(&q, &v, &a, &[], out);

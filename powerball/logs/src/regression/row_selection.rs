@@ -1,6 +1,7 @@
 //! Which samples of a joint become rows: those in which it moves and its torque says something.
 //!
-//! Also here: joints whose samples say nothing, and why; what is to be said of joints that rest in the logs.
+//! Also here: joints whose samples show nothing, and why; what is to be reported about joints that rest in
+//! the logs.
 
 use super::rows::{saturated, saturation_notes};
 use super::{JointRows, Recording};
@@ -92,8 +93,8 @@ fn leave_out<'k>(
 // Joints whose samples say nothing, and why.
 
 /// A joint that moves by less than this in all logs only winds up its gear and its seals: its friction is not
-/// sliding friction, and nothing that depends on position or velocity can be told from a constant. rad, and m
-/// for prismatic joints.
+/// sliding friction, and nothing that depends on position or velocity can be distinguished from a constant.
+/// rad, and m for prismatic joints.
 const LEAST_TRAVEL: [f64; 2] = [0.05, 0.01];
 
 /// Why a joint's samples cannot be used.
@@ -103,12 +104,12 @@ enum Inactive {
     Still,
     /// It moves by so little, with the least that would do.
     HardlyMoves(f64, f64),
-    /// Its torque never changes while it moves.
+    /// The torque never changes while the joint moves.
     Dead,
 }
 
-/// For each joint why nothing can be said of it from these logs, and what to record instead; `None` where
-/// there can. Where a transmission couples joints it is their motors that must move.
+/// For each joint why nothing can be concluded about it from these logs, and what to record instead; `None`
+/// where there can. Where a transmission couples joints it is their motors that must move.
 #[must_use]
 pub fn inactive_joints(arm: &Arm, logs: &[Log]) -> Vec<Option<String>> {
     let logs = &*logs_of_motors(arm, logs);
@@ -170,12 +171,12 @@ pub(super) fn dead(recording: &Recording, joint: usize) -> bool {
     torque.first().is_none_or(|first| torque.iter().all(|t| t == first))
 }
 
-// What is to be said of joints that rest in the logs.
+// What is to be reported about joints that rest in the logs.
 
-/// With fewer rows than these nothing is said of a joint: 0.8 s of motion in the widest band.
+/// With fewer rows than these nothing is reported about a joint: 0.8 s of motion in the widest band.
 pub const FEWEST_ROWS: usize = 14;
 
-/// A note where a joint with so many of all `samples` in the band rests in most or much of them. `limit`
+/// A note where a joint with `rows` rows of all `samples` in the band rests in most or much of them. `limit`
 /// is the velocity below which it rests, rad/s, where it is one for all logs.
 #[must_use]
 pub fn rest_note(joint: JointNumber, rows: usize, samples: usize, limit: Option<f64>) -> Option<String> {
@@ -197,7 +198,7 @@ pub fn rest_note(joint: JointNumber, rows: usize, samples: usize, limit: Option<
     })
 }
 
-/// What was left out, and what is to be said of joints that rested.
+/// What was left out, and what is to be reported about joints that rested.
 pub(super) fn notes(
     left_out: &[String],
     recordings: &[Recording],

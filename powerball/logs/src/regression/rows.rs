@@ -51,7 +51,7 @@ impl JointRows {
         self.torque.is_empty()
     }
 
-    /// Its rows that follow each other without a gap.
+    /// The joint's rows that follow each other without a gap.
     #[must_use]
     pub fn runs(&self) -> Vec<Range<usize>> {
         let mut runs = Vec::new();
@@ -126,10 +126,10 @@ impl Column {
 // Stretches in which a joint's torque stays at its limit: what the drive could not give, or the sensor not
 // show, says nothing of the arm.
 
-/// A torque that stays at the largest or the least value of all logs for so long was cut there, s: measured
+/// A torque that stays at the largest or the least value of all logs for this long was cut there, s: measured
 /// torque that moves by its noise and its resolution does not stay.
 const LEAST: f64 = 0.2;
-/// … in so many samples in a row.
+/// … in this many samples in a row.
 const SAMPLES: usize = 10;
 
 /// When a joint's torque is at its limit, by log: spans of the log's own t, s.
@@ -160,7 +160,7 @@ pub(super) fn saturated(logs: &[Log], joint: usize) -> Vec<Vec<[f64; 2]>> {
     logs.iter().map(of).collect()
 }
 
-/// What is said of a joint's spans, a sentence a log.
+/// What is reported about a joint's spans, a sentence a log.
 pub(super) fn saturation_notes(logs: &[Log], joint: usize, spans: &[Vec<[f64; 2]>]) -> Vec<String> {
     let note = |(log, spans): (&Log, &Vec<[f64; 2]>)| {
         let seconds: f64 = spans.iter().map(|[from, to]| to - from).sum();
@@ -183,7 +183,7 @@ pub(super) fn saturation_notes(logs: &[Log], joint: usize, spans: &[Vec<[f64; 2]
 // alone can explain is taken to be explained, and only what goes beyond is asked for.
 
 impl Data<'_> {
-    /// The same logs with columns of its own for every joint: the minimal set, an offset and its position.
+    /// These logs with columns of its own for every joint: the minimal set, an offset and its position.
     #[must_use]
     pub fn per_joint_fit(mut self) -> Self {
         let joints: Vec<usize> = (0..self.dof()).collect();
@@ -202,7 +202,7 @@ impl Data<'_> {
         self
     }
 
-    /// The same logs with the columns of one minimal set for all joints.
+    /// These logs with the columns of one minimal set for all joints.
     #[must_use]
     pub fn joint_fit(&self) -> Self {
         let mut joints = self.joints.clone();
@@ -210,7 +210,8 @@ impl Data<'_> {
         self.with(Arc::clone(&self.recordings), joints)
     }
 
-    /// Inertial columns of a joint: the minimal set, and where each joint has its own fit what stands beside it.
+    /// Inertial columns of a joint: the minimal set; where each joint has its own fit, also the columns added
+    /// to it.
     #[must_use]
     pub fn inertial_columns(&self) -> usize {
         self.joints.iter().map(|joint| joint.inertial.len()).max().unwrap_or(0)

@@ -36,7 +36,7 @@ pub struct Band {
 struct Stage {
     /// At the rate of its samples.
     filter: Option<Butterworth>,
-    /// The same at full rate, for what is not decimated.
+    /// The filter at full rate, for what is not decimated.
     whole: Option<Butterworth>,
     /// Every how many of its samples one is kept.
     decimation: usize,
@@ -75,7 +75,7 @@ impl Band {
         Band::with_ends(cutoff, rate, ENDS)
     }
 
-    /// The same where `ends` seconds are left out at each end.
+    /// As [`Band::new`], where `ends` seconds are left out at each end.
     #[must_use]
     pub fn with_ends(cutoff: f64, rate: f64, ends: f64) -> Band {
         let wider = BANDS.iter().position(|band| *band == cutoff).unwrap_or(0);
@@ -118,7 +118,7 @@ impl Band {
         self.pass_bands(x, 1).pop().unwrap_or_default()
     }
 
-    /// The same for the last `count` of the bands that this one is made of, itself the last.
+    /// As [`Band::pass`], for the last `count` of the bands that this one is made of, itself the last.
     #[must_use]
     pub fn pass_bands(&self, x: &[f64], count: usize) -> Vec<Vec<f64>> {
         let skipped = self.stages.len().saturating_sub(count);
@@ -150,7 +150,7 @@ impl Band {
         mean_over_frequencies(rate, |f| self.amplitude(f, rate).powi(2)).sqrt()
     }
 
-    /// The same for what passes `wider`, a band with a higher cutoff, and not this one.
+    /// As [`Band::white_share`], for what passes `wider`, a band with a higher cutoff, and not this one.
     #[must_use]
     pub fn white_share_between(&self, wider: &Band, rate: f64) -> f64 {
         mean_over_frequencies(rate, |f| (wider.amplitude(f, rate) - self.amplitude(f, rate)).powi(2)).sqrt()
@@ -287,8 +287,8 @@ mod tests {
         assert!(band.kept(10).is_empty());
     }
 
-    /// At any rate and length the samples of a narrower band lie where they are said to, and are those of one
-    /// filter at full rate but for little; made together with those of wider bands they are the same.
+    /// At any rate and length the samples of a narrower band lie at the documented times, and are those of
+    /// one filter at full rate but for little; made together with those of wider bands they are the same.
     #[test]
     fn narrower_bands_are_made_of_wider_ones() {
         for (rate, n) in

@@ -240,7 +240,7 @@ pub(super) fn write(joints: &[Octaves]) -> Vec<u8> {
 /// others'.
 pub(super) fn read(width: usize, rows: &[Vec<u64>], bytes: &[u8]) -> Option<Vec<Octaves>> {
     let mut bits = Reader { bytes, at: 0 };
-    // So many joints would take more bits than there are.
+    // This many joints would take more bits than there are.
     if rows.len().checked_mul(OCTAVES * width * HEADER as usize)? > 8 * bytes.len() {
         return None;
     }

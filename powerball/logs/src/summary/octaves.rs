@@ -1,4 +1,4 @@
-//! Rows in octaves of time: what a coloured residual costs can be told afterwards.
+//! Rows in octaves of time: what a coloured residual costs can be computed afterwards.
 //!
 //! Neighbouring rows are turned into their sum and their difference over √2, the sums again with their
 //! neighbours, and so on (Haar's transform). It is orthogonal, so the factors of all octaves together are the
@@ -110,7 +110,7 @@ impl Octaves {
         self.levels.iter_mut().for_each(|level| level.round(&steps));
     }
 
-    /// The same rows with combinations of their columns, as [`RFactor::combined`].
+    /// These rows with combinations of their columns, as [`RFactor::combined`].
     #[must_use]
     pub fn combined(&self, columns: &[Vec<(usize, f64)>]) -> Octaves {
         Octaves { levels: self.levels.iter().map(|level| level.combined(columns)).collect() }

@@ -98,7 +98,7 @@ impl Summary {
         push_in_bands(std::slice::from_mut(self), body, log, options, correct)
     }
 
-    /// Counts what is known of a log in the band beside its rows.
+    /// Counts what is known of a log in the band in addition to its rows.
     fn count(&mut self, data: &Data<'_>) {
         self.samples += data.recordings.iter().map(|r| data.band.kept(r.len()).len() as u64).sum::<u64>();
         for (inactive, why) in self.inactive.iter_mut().zip(&data.inactive) {
@@ -121,7 +121,7 @@ pub(super) fn push_in_bands(
     mut correct: impl FnMut(&mut Recording),
 ) -> Result<Vec<String>, DataError> {
     let (mut notes, mut refused) = (Vec::new(), None);
-    // A log is reduced by itself and rounded once, so that it is the same in a file and beside others.
+    // A log is reduced by itself and rounded once, so that it is the same in a file and together with others.
     let empty = |summary: &Summary| Summary::without_logs(summary.identity.clone());
     let mut reduced: Vec<Summary> = summaries.iter().map(empty).collect();
     // By band: the seconds that were taken in.
@@ -265,7 +265,7 @@ impl Steepness {
         })
     }
 
-    /// The same for the column's derivative by ln γ.
+    /// As [`Self::weights`], for the column's derivative by ln γ.
     #[must_use]
     pub fn slopes(&self, gamma: f64) -> [f64; NODES] {
         let (_, half) = self.scale();

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 /// What a file begins with that Zstandard compressed.
 pub(super) const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
-/// What rosbag2 says of a recording, in its folder.
+/// The description that rosbag2 writes of a recording, in its folder.
 const METADATA: &str = "metadata.yaml";
 
 /// The files of a recording, in order.
@@ -35,7 +35,7 @@ struct Information {
 }
 
 impl Parts {
-    /// Those of a file or a folder.
+    /// The parts of a file or a folder.
     pub(super) fn of(path: &Path) -> Result<Parts, LogError> {
         if !path.is_dir() {
             return Ok(Parts { files: vec![path.into()], compressed_messages: false, notes: Vec::new() });
@@ -156,7 +156,7 @@ pub(super) fn unpacked_head(path: &Path, length: u64) -> io::Result<Vec<u8>> {
     Ok(head)
 }
 
-/// What is said where a build lacks a format.
+/// What is reported where a build lacks a format.
 macro_rules! reader {
     ($feature:literal, $function:ident, $read:expr) => {
         #[cfg(feature = $feature)]

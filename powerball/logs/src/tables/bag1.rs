@@ -8,7 +8,7 @@ use std::path::Path;
 
 /// What a bag begins with.
 pub(super) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
-/// Its first record fills so many bytes.
+/// The first record of a bag fills this many bytes.
 const HEAD: u64 = 4096;
 
 /// Reads the topics of a bag; what is wrong with it.
@@ -46,10 +46,10 @@ pub(super) fn read(path: &Path, topics: &mut Topics) -> io::Result<Vec<String>> 
             first.get_or_insert(error);
         }
     }
-    let told = first.map(|error| {
+    let message = first.map(|error| {
         format!("{lost} of {chunks} chunks are damaged (the first: {error}): their messages are lost, the others were read")
     });
-    Ok(told.into_iter().collect())
+    Ok(message.into_iter().collect())
 }
 
 fn take(record: MessageRecord<'_>, topics: &mut Topics) -> Result<(), Error> {

@@ -77,7 +77,7 @@ impl<'a> Cdr<'a> {
         if count > MOST_OF_A_TYPE { Err("is torn".into()) } else { Ok(count) }
     }
 
-    /// A number of so many bytes.
+    /// A number of `size` bytes.
     pub(super) fn number(&mut self, size: usize, bits: Bits) -> Result<f64, String> {
         self.align(size);
         let mut own = [0; 8];
@@ -95,7 +95,7 @@ impl<'a> Cdr<'a> {
         })
     }
 
-    /// Passes over numbers of so many bytes.
+    /// Passes over `count` numbers of `size` bytes.
     pub(super) fn skip(&mut self, count: usize, size: usize) -> Result<(), String> {
         if count > 0 {
             self.align(size);
@@ -129,7 +129,7 @@ impl<'a> Cdr<'a> {
         if self.alignment == 4 { self.u32().map(|_| ()) } else { Ok(()) }
     }
 
-    /// Before a message; where it ends, if that is said.
+    /// Before a message; where it ends, if that is stated.
     pub(super) fn begin_message(&mut self) -> Result<Option<usize>, String> {
         if !self.delimited {
             return Ok(None);

@@ -1,4 +1,4 @@
-//! The same columns in Parquet. A list of k numbers is k columns; the fields of a struct are columns too.
+//! Columns of a log in Parquet. A list of k numbers is k columns; the fields of a struct are columns too.
 
 #[cfg(feature = "parquet")]
 use super::lerobot::Dataset;
@@ -22,10 +22,10 @@ use parquet::schema::types::ColumnDescPtr;
 /// A file that claims more rows does not have them.
 #[cfg(feature = "parquet")]
 const ROWS_A_BYTE: u64 = 64;
-/// So many rows are in memory at a time.
+/// Rows that are in memory at a time.
 #[cfg(feature = "parquet")]
 const ROWS: usize = 8192;
-/// The same where rows hold texts or pictures.
+/// As [`ROWS`], where rows hold texts or pictures.
 #[cfg(feature = "parquet")]
 const ROWS_OF_TEXTS: usize = 256;
 
@@ -82,7 +82,7 @@ impl<'s, S: RowSink> Rows<'s, S> {
             }])
         };
         let length = input.len();
-        // What Arrow noted of its own types beside those of Parquet says nothing more about numbers.
+        // What Arrow noted of its own types in addition to those of Parquet says nothing more about numbers.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let builder = guarded(|| ParquetRecordBatchReaderBuilder::try_new_with_options(input, options))
             .map_err(|e| unreadable(None, &e))?;

@@ -13,7 +13,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// The formats that are told apart.
+/// The formats that are distinguished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Format {
     /// Lines of text with a header line.
@@ -142,7 +142,7 @@ pub fn read_contents(path: &Path) -> Result<Contents, LogError> {
     read_topics(&mut Place::of(path)?, &shown(path), None)
 }
 
-/// The same with the topics of some names alone, where a file has topics; others are counted.
+/// As [`read_contents`], with the topics of some names alone, where a file has topics; others are counted.
 /// `file` stands in messages.
 pub(crate) fn read_topics(place: &mut Place, file: &str, only: Only<'_>) -> Result<Contents, LogError> {
     let (format, path) = (place.format, place.path.clone());

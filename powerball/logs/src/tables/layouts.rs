@@ -42,7 +42,7 @@ enum Of<'a> {
     Torque(&'a str, &'static str),
 }
 
-/// Writes both beside an MCAP: `NAME.foxglove.json` and `NAME.plotjuggler.xml`.
+/// Writes both layouts next to an MCAP: `NAME.foxglove.json` and `NAME.plotjuggler.xml`.
 pub fn write(mcap: &Path, held: Held<'_>) -> io::Result<()> {
     let columns = plots(held);
     std::fs::write(mcap.with_extension("foxglove.json"), foxglove(&columns).to_string())?;

@@ -90,7 +90,7 @@ fn numbered(data: &Path) -> std::io::Result<Vec<PathBuf>> {
 
 /// A file whose episodes follow each other, or another one.
 pub(super) struct Dataset {
-    /// Their number's and their time's place among the columns.
+    /// The place of the episodes' number and time among the columns.
     at: Option<(usize, usize)>,
     /// The number of the present one, and its last time.
     last: Option<(f64, f64)>,
@@ -148,7 +148,7 @@ impl Dataset {
     }
 }
 
-/// What a dataset of LeRobot's says of itself, where a file is part of one.
+/// The description in a dataset of LeRobot's, where a file is part of one.
 fn description(file: &Path) -> Option<Value> {
     let folders = file.ancestors().skip(1).take(ABOVE);
     let text = folders.map(|folder| folder.join(INFO)).find_map(|f| std::fs::read(f).ok())?;

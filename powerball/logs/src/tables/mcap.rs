@@ -25,7 +25,7 @@ const LZ4_MOST: u64 = 256;
 
 /// Bytes of a message that Zstandard compressed very well.
 const SHORTEST: u64 = 2;
-/// So many bytes are read ahead where records follow each other.
+/// Bytes that are read ahead where records follow each other.
 const AHEAD: u64 = 256 << 10;
 
 /// Where the bytes of a file come from.
@@ -33,7 +33,7 @@ pub(super) trait Source {
     /// How many there are.
     fn length(&mut self) -> io::Result<u64>;
 
-    /// Those from a place on; fewer where the file ends.
+    /// The bytes from a place on; fewer where the file ends.
     fn range(&mut self, from: u64, length: u64) -> io::Result<Vec<u8>>;
 }
 
@@ -88,7 +88,7 @@ pub(super) fn read(path: &Path, topics: &mut Topics) -> io::Result<Vec<String>> 
     read_from(&mut File::open(path)?, topics)
 }
 
-/// The same, wherever its bytes come from.
+/// As [`read`], wherever the bytes come from.
 pub(super) fn read_from(source: &mut impl Source, topics: &mut Topics) -> io::Result<Vec<String>> {
     let mut records = Records::new(topics);
     let all = match summary(source) {
@@ -134,7 +134,7 @@ struct Records<'t> {
     schemas: HashMap<u16, (String, String, Vec<u8>)>,
     /// Messages that were taken or counted.
     messages: u64,
-    /// Those of topics that are read.
+    /// Messages of topics that are read.
     taken: u64,
     /// Whether a chunk was left where it is, with its index.
     passed_over: bool,

@@ -155,7 +155,7 @@ fn failed(error: McapError) -> io::Error {
 /// What lines of CSV became.
 pub(crate) struct Written {
     pub(crate) rows: usize,
-    /// Their names in the file.
+    /// The joints' names in the file.
     pub(crate) joints: Vec<String>,
     pub(crate) velocities: bool,
 }

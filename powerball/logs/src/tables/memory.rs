@@ -1,11 +1,11 @@
-//! How much memory a log may take, and how many columns a table: what a file says of its own size is compared with both before
-//! room is made for it.
+//! How much memory a log may take, and how many columns a table: the size that a file states is compared with
+//! both before room is made for it.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Bytes that a log may take in this process; 0 where nobody said it.
+/// Bytes that a log may take in this process; 0 where none was set.
 static ALLOWED: AtomicU64 = AtomicU64::new(0);
-/// The same where nobody said it and the system does not tell what is free.
+/// Bytes that a log may take where none was set and the system does not report what is free.
 const ELSEWHERE: u64 = 4_000_000_000;
 /// A table of more columns is no log: an arm has some dozens, and a recording of a whole robot some hundreds.
 const MOST_COLUMNS: usize = 10_000;

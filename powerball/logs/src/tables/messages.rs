@@ -48,7 +48,8 @@ struct Topic {
     expected: usize,
 }
 
-/// What a file says of the type of messages: its name, the language of its definition, and the definition.
+/// What a file states about the type of messages: its name, the language of its definition, and the
+/// definition.
 pub(super) type Type<'a> = (&'a str, &'a str, &'a [u8]);
 
 impl Reader {
@@ -234,8 +235,9 @@ fn dynamic_joint_state(mut message: Cdr<'_>, row: &mut Row<'_>) -> Stamp {
 }
 
 /// A JSON object: its numbers, by their path. The elements of an array are counted from 1: `q` of three
-/// values is `q1`, `q2`, `q3`. A `name` array beside arrays of as many values names them, as in a JointState, and objects of
-/// an array that each have a name are named by these, as in `foxglove.JointStates`.
+/// values is `q1`, `q2`, `q3`. A `name` array next to arrays of as many values names them, as in a
+/// JointState, and objects of an array that each have a name are named by these, as in
+/// `foxglove.JointStates`.
 fn json(message: &[u8], row: &mut Row<'_>) -> Stamp {
     let message: Value = serde_json::from_slice(message).map_err(|e| format!("is no JSON: {e}"))?;
     let Value::Object(fields) = &message else { return Err("is no JSON object".into()) };

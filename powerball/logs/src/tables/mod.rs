@@ -47,7 +47,7 @@ pub(crate) mod text;
 #[allow(dead_code, reason = "a build with every format says it of none")]
 pub(crate) const NOT_READ: &str =
     "this build does not read it: build with `--features formats`, which reads every format";
-/// The same of a file that is to be written.
+/// As [`NOT_READ`], for a file that is to be written.
 #[allow(dead_code, reason = "as above")]
 pub(crate) const NOT_WRITTEN: &str =
     "this build does not write it: build with `--features formats`, or name a .csv";

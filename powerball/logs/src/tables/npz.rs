@@ -208,7 +208,7 @@ fn values<'d>(descr: &str, elements: impl Iterator<Item = &'d [u8]>) -> Result<V
     Ok(Values::Numbers(elements.flat_map(|element| element.chunks_exact(size)).map(value).collect()))
 }
 
-/// A unit of time, `10ms`, as so many parts of which so many are a second.
+/// A unit of time, `10ms`, as a number of parts and how many of these parts are a second.
 fn time_unit(unit: Option<&str>) -> Option<(i64, i64)> {
     let unit = unit?;
     let letters = unit.trim_start_matches(|c: char| c.is_ascii_digit());

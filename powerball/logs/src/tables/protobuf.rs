@@ -1,9 +1,9 @@
 //! Messages of Protocol Buffers by the definition in their file: a `FileDescriptorSet`
 //! (<https://mcap.dev/spec/registry#protobuf>).
 //!
-//! A value's name is its path: `pose.position.x`; the values of a list are counted from 1, or named by a list of names beside
-//! them. A list of messages that each have a name, as `foxglove.JointStates` is, is named by these: `joints.position.elbow` is
-//! `position.elbow`.
+//! A value's name is its path: `pose.position.x`; the values of a list are counted from 1, or named by a list
+//! of names next to them. A list of messages that each have a name, as `foxglove.JointStates` is, is named by
+//! these: `joints.position.elbow` is `position.elbow`.
 
 use super::schema::{MOST, NAMES};
 use super::table::Row;

@@ -16,11 +16,11 @@ use std::path::PathBuf;
 use std::time::Duration;
 use tokio::runtime::{Builder, Runtime};
 
-/// A server that says nothing for so long is not there.
+/// A server that sends nothing for this long is not there.
 const SILENCE: Duration = Duration::from_secs(30);
 const CONNECTING: Duration = Duration::from_secs(10);
 const RETRIES: usize = 2;
-/// Copies are fetched in pieces of so many bytes.
+/// Copies are fetched in pieces of this many bytes.
 const PIECE: u64 = 16 << 20;
 
 /// A log that is not here.

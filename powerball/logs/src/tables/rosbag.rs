@@ -1,8 +1,9 @@
 //! rosbag2 files of the storage `sqlite3` (`.db3`): the tables `topics` and `messages`.
 //!
-//! A bag whose program died has its last messages in a file beside it that ends in `-wal`, or half a transaction to take
-//! back in one that ends in `-journal`. SQLite brings both in order by writing into them, so it is given copies; any other
-//! bag is opened for reading alone, without a lock. Either way nothing in the bag's folder is written or left behind.
+//! A bag whose program died has its last messages in a file next to it that ends in `-wal`, or half a
+//! transaction to take back in one that ends in `-journal`. SQLite brings both in order by writing into them,
+//! so it is given copies; any other bag is opened for reading alone, without a lock. Either way nothing in
+//! the bag's folder is written or left behind.
 
 use super::messages::Topics;
 use rusqlite::{Connection, ErrorCode, OpenFlags};
@@ -25,7 +26,7 @@ struct Bag {
 }
 
 fn opened(path: &Path) -> io::Result<Bag> {
-    let waiting = ["-wal", "-journal"].map(|ending| beside(path, ending));
+    let waiting = ["-wal", "-journal"].map(|ending| with_ending(path, ending));
     let there = |file: &PathBuf| std::fs::metadata(file).is_ok_and(|m| m.len() > 0);
     if !waiting.iter().any(there) {
         // A file that nobody writes needs no lock, and a folder that nobody may write none either.
@@ -37,19 +38,19 @@ fn opened(path: &Path) -> io::Result<Bag> {
     let copy = folder.path().join("bag.db3");
     std::fs::copy(path, &copy)?;
     for (from, ending) in waiting.iter().zip(["-wal", "-journal"]).filter(|(from, _)| there(from)) {
-        std::fs::copy(from, beside(&copy, ending))?;
+        std::fs::copy(from, with_ending(&copy, ending))?;
     }
     let database = Connection::open(&copy).map_err(failed)?;
     Ok(Bag { database, _copy: Some(folder) })
 }
 
-fn beside(path: &Path, ending: &str) -> PathBuf {
+fn with_ending(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(ending);
     name.into()
 }
 
-/// A file that does not change, as SQLite is told it.
+/// The URI by which SQLite opens a file that does not change.
 fn uri(path: &Path) -> io::Result<String> {
     let path = std::path::absolute(path)?;
     let path = path.to_str().ok_or_else(|| io::Error::other("its path is no Unicode: rename it"))?;

@@ -2,7 +2,7 @@
 //!
 //! A definition is the text of a `.msg` file and of all that it is made of, one after the other
 //! (<https://mcap.dev/spec/registry#ros2msg>; ROS 1 writes the same into its bags). A value's name is its path:
-//! `pose.position.x`; the values of an array are counted from 1, or named by a list of names beside them.
+//! `pose.position.x`; the values of an array are counted from 1, or named by a list of names next to them.
 
 use super::cdr::Cdr;
 use super::table::Row;

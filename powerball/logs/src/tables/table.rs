@@ -11,7 +11,7 @@ pub(crate) trait RowSink {
     /// Why rows of these columns are of no use.
     fn begin(&mut self, names: &[String]) -> Result<(), super::LogError>;
 
-    /// About so many rows follow: room is made for them at once, where there is so much.
+    /// About `rows` rows follow: room is made for them at once, where there is enough.
     fn expect(&mut self, rows: usize);
 
     /// How many numbers are kept of a row, its line among them.
@@ -21,8 +21,8 @@ pub(crate) trait RowSink {
     fn row(&mut self, line: usize, number: &dyn Fn(usize) -> Option<f64>);
 }
 
-/// Makes room for so many more values at once, so that no second copy is ever needed; a file that claims more than there is
-/// gets none.
+/// Makes room for `more` further values at once, so that no second copy is ever needed; a file that claims
+/// more than there is gets none.
 pub(crate) fn make_room<T>(values: &mut Vec<T>, more: usize) {
     let _ = values.try_reserve_exact(more);
 }
@@ -49,7 +49,7 @@ pub struct Table {
 /// One column of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
-    /// Its name: `q1`, `position.shoulder_pan_joint`.
+    /// The column's name: `q1`, `position.shoulder_pan_joint`.
     pub name: String,
     /// One value a sample, not a number where there is none.
     pub values: Vec<f64>,

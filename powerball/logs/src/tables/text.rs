@@ -7,10 +7,10 @@ use super::{Finding, LogError};
 use std::cell::Cell;
 use std::io::Read;
 
-/// So many bytes show whether a file is text.
+/// The first bytes of this number show whether a file is text.
 pub(super) const HEAD: usize = 4096;
 
-/// The names of the columns stand within so many bytes.
+/// The names of the columns are within this many bytes.
 const LONGEST_HEADER: u64 = 1 << 20;
 
 /// What files begin with that are no logs, and what they are.

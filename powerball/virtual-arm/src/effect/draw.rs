@@ -211,8 +211,8 @@ impl PlantEffect {
         "friction_by_position",
     ];
 
-    /// Those among which a seed chooses: a name that came later is not one of them, so that a seed goes on to choose as it
-    /// did.
+    /// The names among which a seed chooses: a name that came later is not one of them, so that a seed still
+    /// chooses as it did.
     pub fn chosen_by_seed() -> &'static [&'static str] {
         &Self::NAMES[..18]
     }
@@ -255,7 +255,7 @@ impl PlantEffect {
         }
     }
 
-    /// The same effect about `factor` times as large, where and when it is.
+    /// This effect about `factor` times as large, where and when it is.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> PlantEffect {
         let mut scaled = self.clone();

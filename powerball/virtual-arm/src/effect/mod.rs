@@ -15,8 +15,8 @@ use serde::{Deserialize, Serialize};
 /// Elastic sliders that make up presliding.
 const SLIDERS: usize = 4;
 
-/// Stiffness of a gear's teeth once they touch, N·m/rad: so high that winding up is no second effect beside
-/// the play.
+/// Stiffness of a gear's teeth once they touch, N·m/rad: so high that winding up is no second effect in
+/// addition to the play.
 const TEETH: f64 = 2.0e5;
 
 /// A gear that gives way: a spring between motor and link, with play.
@@ -103,7 +103,7 @@ pub enum PlantEffect {
     Payload {
         /// Mass, kg.
         mass: f64,
-        /// Its centre in the last frame, m.
+        /// Centre of the body in the last frame, m.
         centre: [f64; 3],
         /// From this time on, s.
         start: f64,
@@ -170,7 +170,7 @@ pub enum PlantEffect {
         /// From one time to the next, s.
         every: f64,
     },
-    /// A link's centre of mass lies beside the plane in which it was declared to lie.
+    /// A link's centre of mass lies off the plane in which it was declared to lie.
     BrokenSymmetry {
         /// The link.
         link: usize,

@@ -29,14 +29,14 @@ pub struct Setup {
     pub modules: Vec<Module>,
     /// Joint positions at the start, rad.
     pub start: Vec<f64>,
-    /// Age of the plant at the start, s: what warms has been warming for so long.
+    /// Age of the plant at the start, s: what warms has been warming for this time.
     pub age: f64,
     /// Seed of the sensors' noise.
     pub seed: u64,
 }
 
 impl Setup {
-    /// The same with drives that have a current mode.
+    /// This setup with drives that have a current mode.
     #[must_use]
     pub fn with_current_mode(mut self, mode: CurrentMode) -> Setup {
         self.modules.iter_mut().for_each(|module| module.current_mode = Some(mode));
@@ -68,7 +68,7 @@ struct Noise {
 }
 
 impl Clone for Noise {
-    /// The same noise from here on, which the generator leaves to who asks for it.
+    /// The same noise from here on: the generator has no `Clone`, so its state is copied.
     fn clone(&self) -> Self {
         Noise { rng: ChaCha8Rng::deserialize_state(&self.rng.serialize_state()), slow: self.slow.clone() }
     }
@@ -112,14 +112,14 @@ impl VirtualArm {
         &self.simulation
     }
 
-    /// The same with a hand on its links.
+    /// This arm with a hand on its links.
     #[must_use]
     pub fn with_hand(mut self, hand: Hand) -> Self {
         self.hand = Some(hand);
         self
     }
 
-    /// Sets the plant's age, s: what warms has been warming for so long.
+    /// Sets the plant's age, s: what warms has been warming for this time.
     pub fn set_age(&mut self, age: f64) {
         self.simulation.set_time(age);
     }
@@ -257,11 +257,11 @@ fn speak(arm: &mut impl Peer, bus: &mut impl Bus) -> Result<(), BusError> {
 
 // What a joint's module is: the facts that its drive is set up with.
 
-/// A mode in which the set-point is a current. The maker's public files have none, so this is told and not
-/// known.
+/// A mode in which the set-point is a current. The maker's public files have none, so this is declared and
+/// not known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CurrentMode {
-    /// Its number in 0x6060.
+    /// The mode's number in 0x6060.
     pub mode: i8,
     /// Where its set-point goes: i16, per mille of the rated current.
     pub target: Object,
@@ -270,7 +270,7 @@ pub struct CurrentMode {
 /// One joint's module.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Module {
-    /// Its node.
+    /// The module's node.
     pub node: NodeId,
     /// Who it says that it is.
     pub identity: Identity,

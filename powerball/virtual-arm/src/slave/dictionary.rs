@@ -20,9 +20,9 @@ pub enum Value {
 /// One object.
 #[derive(Clone, Debug)]
 pub struct Entry {
-    /// Its address.
+    /// The entry's address.
     pub object: Object,
-    /// Its type.
+    /// The entry's type.
     pub kind: DataType,
     /// Whether it can be read.
     pub readable: bool,

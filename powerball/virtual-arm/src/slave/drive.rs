@@ -7,7 +7,7 @@ use powerball_bus::cia402::{Command, Controlword, Mode, State, Statusword};
 
 /// A brake bites and lets go after this time, s.
 const BRAKE_TIME: f64 = 0.02;
-/// A quick stop brakes so much harder than a joint usually may.
+/// A quick stop brakes this many times as hard as a joint usually may.
 const QUICK: f64 = 2.0;
 /// Below this velocity a joint stands still, rad/s.
 const STILL: f64 = 2e-3;
@@ -81,7 +81,7 @@ pub(super) struct Drive {
     pub(super) brake_stuck: bool,
     /// Motor supply is there.
     pub(super) supply: bool,
-    /// What tripped the drive and was not told yet.
+    /// What tripped the drive and was not reported yet.
     pub(super) trip: Option<Trip>,
     /// Torque of the last tick, N·m.
     pub(super) torque: f64,
@@ -330,7 +330,7 @@ impl Drive {
         self.reference.velocity == 0.0 && actual[1].abs() < STILL
     }
 
-    /// The brake follows what is asked of it with its delay.
+    /// The brake follows its command with its delay.
     fn brake(&mut self, h: f64, inputs: &Inputs) {
         let halted = self.halted && self.reference.velocity == 0.0;
         let close = !self.state.has_torque() || !self.supply || halted || inputs.brake || self.brake_stuck;

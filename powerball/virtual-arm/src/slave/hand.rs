@@ -33,7 +33,7 @@ pub struct Hand {
     log: HandLog,
 }
 
-/// One tick in so many is written down.
+/// One tick in this many is written down.
 const EVERY: u64 = 10;
 
 impl Hand {

@@ -43,7 +43,7 @@ struct Sample {
 /// What can be made to go wrong at a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// The node neither hears nor speaks; its drive goes on with what it was last told. `false` ends it.
+    /// The node neither hears nor speaks; its drive continues with the last command. `false` ends it.
     Silent(bool),
     /// The node restarts.
     Reboot,
@@ -61,7 +61,7 @@ pub enum Fault {
     RefuseMode(Option<Mode>),
     /// The statusword is this, whatever the drive does.
     Statusword(Option<u16>),
-    /// The brake closes and stays closed, whatever the drive asks of it. `false` ends it.
+    /// The brake closes and stays closed, whatever the drive commands. `false` ends it.
     BrakeStuck(bool),
     /// Heartbeats stop while everything else goes on.
     NoHeartbeat(bool),

@@ -50,7 +50,7 @@ pub struct Node {
     next_heartbeat: Micros,
     boots_at: Option<Micros>,
     sample: Sample,
-    /// What the drive is told, as the dictionary had it when it was last written.
+    /// What the drive is commanded, as the dictionary had it when it was last written.
     inputs: Inputs,
     /// What is made to go wrong.
     silent: bool,
@@ -99,7 +99,7 @@ impl Node {
         &self.module
     }
 
-    /// Its state in network management.
+    /// The node's state in network management.
     pub fn nmt_state(&self) -> nmt::State {
         self.nmt
     }

@@ -75,11 +75,11 @@ fn mapping_of(dictionary: &Dictionary, index: u16, count: i64) -> Result<Mapping
 /// One PDO as it is set up.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pdo {
-    /// Its identifier.
+    /// The PDO's identifier.
     pub(super) id: u16,
-    /// Its transmission type.
+    /// The PDO's transmission type.
     pub(super) kind: u8,
-    /// Its objects.
+    /// The PDO's objects.
     pub(super) mapping: Mapping,
 }
 

@@ -388,7 +388,7 @@ fn faults_on_demand_do_what_they_say() {
 }
 
 #[test]
-fn a_current_mode_is_there_only_where_it_is_told() {
+fn a_current_mode_is_there_only_where_it_is_declared() {
     let mut setup = lwa4p::setup(START, 1).unwrap();
     let target = Object::new(0x6071, 0);
     setup.modules[0].commutated = true;

@@ -76,7 +76,7 @@ fn values_of_every_length_are_read_and_written() {
 }
 
 #[test]
-fn an_abort_is_told_in_words() {
+fn an_abort_is_reported_in_words() {
     let mut client = client();
     client.read(Object::new(0x6071, 0), 0);
     let abort = Response::Abort { object: Object::new(0x6071, 0), code: AbortCode::NO_OBJECT };

@@ -1,4 +1,4 @@
-//! The TOML beside the DCF: what the drive's file cannot know of the arm.
+//! The TOML that goes with the DCF: what the drive's file cannot know of the arm.
 
 use crate::canopen::Object;
 use serde::Deserialize;
@@ -133,7 +133,7 @@ fn velocity_error() -> f64 {
 pub struct Mapped {
     /// Which object.
     pub object: Object,
-    /// Its bits, where told.
+    /// The object's bits, where given.
     pub bits: Option<u8>,
 }
 

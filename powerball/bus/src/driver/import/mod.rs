@@ -48,7 +48,7 @@ fn say(note: &str) {
 }
 
 /// Rust source with the constants `DICTIONARY` and `constant` (a `Profile`) for the arm of `toml` with the
-/// drives of `dcf` and its `overlays`. `source` is told in the file's head.
+/// drives of `dcf` and its `overlays`. `source` is named in the file's head.
 ///
 /// # Errors
 /// Where one of the files cannot be read, with the line, or where they contradict each other.

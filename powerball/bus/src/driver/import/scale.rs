@@ -16,7 +16,7 @@ const FEED: u16 = 0x6092;
 
 /// Fewer counts in a turn than degrees are no scale of a joint: drives come with 1 / 1 where nobody has set them.
 const FEWEST: f64 = 360.0;
-/// The TOML's value may be rounded by so much of it.
+/// The TOML's value may be rounded by this share of it.
 const ROUNDING: f64 = 1e-4;
 
 /// Counts in a turn of the shaft, and which objects say so.
@@ -48,7 +48,7 @@ fn turn(drive: &Dcf, node: u8) -> Option<Turn> {
     })
 }
 
-/// Counts in a degree of a joint, and what is to be said of them.
+/// Counts in a degree of a joint, and what is to be reported about them.
 ///
 /// # Errors
 /// Where neither file gives a scale, or it is none of a joint.
@@ -115,7 +115,7 @@ mod tests {
             let (counts, note) = scaled(objects, "").unwrap();
             assert_eq!(counts * 360.0, turn);
             assert!(note.unwrap().contains(&format!("{turn} counts a turn")), "{objects:?}");
-            // The same given is nothing to speak of, with a sign too; another is said, and counts.
+            // An equal given value is not reported, with either sign; another one is reported, and counts.
             assert_eq!(scaled(objects, &format!("counts_per_degree = {}", -turn / 360.0)).unwrap().1, None);
             let (counts, note) = scaled(objects, "counts_per_degree = 1234.0").unwrap();
             assert!(counts == 1234.0 && note.unwrap().contains(&format!("says {turn}")), "{objects:?}");

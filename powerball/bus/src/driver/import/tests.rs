@@ -7,7 +7,7 @@ const TOML: &str = include_str!("../../../../lwa4p_bus.toml");
 const SOURCE: &str =
     "Schunk_0_63.dcf (D. Osswald, SCHUNK, 2013; ipa320/schunk_robots) and powerball/lwa4p_bus.toml";
 
-/// The DCF is not ours to copy; its place can be told by the environment.
+/// The DCF is not ours to copy; its place can be given by the environment.
 fn dcf() -> Option<Vec<u8>> {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/hardware/Schunk_0_63_lwa4p.dcf");
     let path = std::env::var_os("POWERBALL_DCF").map_or(file, PathBuf::from);
@@ -67,7 +67,7 @@ fn refused(toml: &str) -> String {
 }
 
 #[test]
-fn contradictions_are_told() {
+fn contradictions_are_reported() {
     assert!(refused(&TOML.replace("bitrate = 500_000", "bitrate = 800_000")).contains("800000"));
     assert!(refused(&TOML.replace("node = 4", "node = 3")).contains("same node id"));
     assert!(refused(&TOML.replace("rate = 200 ", "rate = 300 ")).contains("divisor"));

@@ -104,7 +104,7 @@ fn profile(out: &mut String, drive: &Dcf, arm: &Arm, constant: &str) -> Result<(
     let mut said: Vec<String> = Vec::new();
     for joint in &arm.joint {
         let (counts, note) = scale::counts_per_degree(drive, joint)?;
-        // Drives of one kind have one scale: it is said once.
+        // Drives of one kind have one scale: it is reported once.
         if let Some(note) = note.filter(|note| !said.contains(note)) {
             say(&note);
             said.push(note);

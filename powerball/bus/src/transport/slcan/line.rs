@@ -1,4 +1,4 @@
-//! The lines of slcan: Lawicel's commands and answers, and what Linux's own slcan driver reads besides.
+//! The lines of slcan: Lawicel's commands and answers, and what Linux's own slcan driver reads in addition.
 
 use crate::canopen::Frame;
 

@@ -27,7 +27,7 @@ const ROOM: usize = 1024;
 const ANSWER: Micros = 500_000;
 /// Time from one question for the status flags to the next, µs.
 const ASKING: Micros = 250_000;
-/// An adapter that leaves a question without an answer for so long is gone, µs.
+/// An adapter that leaves a question without an answer for this long is gone, µs.
 const SILENCE: Micros = 1_000_000;
 /// Windows takes 0 for "for ever".
 const WRITE_TIMEOUT: Duration = if cfg!(windows) { Duration::from_millis(1) } else { Duration::ZERO };

@@ -12,7 +12,7 @@ use std::thread::JoinHandle;
 struct Adapter {
     /// Commands that it refuses with a bell, by their first letters.
     refuses: Vec<&'static str>,
-    /// Its answer to `F`, which clears it; `None` where it has no such command.
+    /// The answer to `F`, which clears it; `None` where it has no such command.
     flags: Option<u8>,
     /// It answers nothing at all.
     silent: bool,
@@ -99,13 +99,13 @@ impl Port {
 
     /// What it is given but for empty lines, once it has `last`.
     fn heard_until(&self, last: &str) -> Vec<String> {
-        let begun = std::time::Instant::now();
+        let start = std::time::Instant::now();
         loop {
             let heard = self.heard();
             if heard.last().is_some_and(|line| line == last) {
                 return heard.into_iter().filter(|line| !line.is_empty()).collect();
             }
-            assert!(begun.elapsed().as_secs() < 10, "{heard:?}");
+            assert!(start.elapsed().as_secs() < 10, "{heard:?}");
             std::thread::sleep(Duration::from_millis(1));
         }
     }
@@ -167,7 +167,7 @@ fn flags_become_events() {
     let port = Port::new(Adapter { flags: Some(0x20), ..Adapter::default() });
     let mut bus = port.open();
     assert_eq!(first(&mut bus, 1), [Event::ErrorPassive]);
-    // Told once as long as it lasts; an error on the bus alone is none.
+    // Reported once as long as it lasts; an error on the bus alone is none.
     port.adapter.lock().unwrap().flags = Some(0xA0);
     assert_eq!(events(&mut bus, 300), []);
     port.adapter.lock().unwrap().flags = Some(0x08);

@@ -9,8 +9,8 @@ use serde_json::json;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-/// Record a virtual arm with an effect that the model is not told of, identify, explain, and compare with the
-/// truth.
+/// Record a virtual arm with an effect that the model does not know about, identify, explain, and compare
+/// with the truth.
 ///
 /// Writes the logs, arm.toml, explained.json and report.html. Exits with 0 unless something broke: a wrong
 /// name is a result.
@@ -105,7 +105,7 @@ impl DemoCommand {
         out.push_str(&super::explain::open_in_words(explained));
         let _ = writeln!(
             out,
-            "\nnamed:         {}\nin the plant:  {}\n\n{}\n\n{}\n{} and the logs beside it, {seconds:.1} s",
+            "\nnamed:         {}\nin the plant:  {}\n\n{}\n\n{}\n{} and the logs next to it, {seconds:.1} s",
             verdict.named_in_words(),
             verdict.truth_in_words(),
             verdict.sentence(),

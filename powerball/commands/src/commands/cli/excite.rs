@@ -59,7 +59,8 @@ pub(super) fn floor(text: &str) -> Result<FloorAt, String> {
 /// Search exciting trajectories (Eq. 17 to 20) within the arm's limits and surroundings, and write them.
 ///
 /// Kept are the file's limits of position, velocity, acceleration and torque, the floor, and the distance of
-/// the arm's links from each other, as capsules along its geometry. What had to be assumed for that is said.
+/// the arm's links from each other, as capsules along its geometry. What had to be assumed for that is
+/// reported.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Examples:\n  powerball excite --arm arm.toml --out path.csv --period 10 --harmonics 5 \

@@ -67,7 +67,7 @@ pub(crate) struct Explain {
     #[arg(long, value_name = "URL", default_value = "virtual", requires = "experiment")]
     bus: BusUrl,
     /// What is undeclared in the virtual arm, where it is on --bus virtual: as `powerball demo` writes it;
-    /// without, the file virtual_arm.json beside the arm file.
+    /// without, the file virtual_arm.json next to the arm file.
     #[arg(long, value_name = "FILE", requires = "experiment")]
     plant: Option<PathBuf>,
     #[command(flatten)]
@@ -143,7 +143,7 @@ impl Explain {
 }
 
 impl Explain {
-    /// The bus of the experiment, opened before any work is done, and what there is to say of it.
+    /// The bus of the experiment, opened before any work is done, and what there is to report about it.
     fn arm(&self) -> Result<(Box<dyn Bus>, Option<String>), Failure> {
         if self.bus != BusUrl::Virtual {
             if self.plant.is_some() {
@@ -167,7 +167,7 @@ impl Explain {
         Where { bus: self.bus.clone(), json: self.inputs.json }
     }
 
-    /// Records the experiment and reads its log, with what is to be said of that.
+    /// Records the experiment and reads its log, with what is to be reported about that.
     fn recorded(
         &self,
         motion: &Motion,
@@ -244,7 +244,7 @@ pub(super) fn summary(explained: &Explained, arm: &Path, out: &Path) -> String {
     head.join("\n")
 }
 
-/// The same with all evidence, rivals and notes.
+/// As [`summary`], with all evidence, rivals and notes.
 pub(super) fn everything(explained: &Explained, arm: &Path, out: &Path) -> String {
     let first = output::first_lines(&explained.unusable, explained.conventions.as_ref(), true);
     let mut text = first.iter().map(|line| format!("{line}\n")).collect::<String>();
@@ -319,7 +319,7 @@ fn table(explained: &Explained) -> String {
     text
 }
 
-/// One line a name, of so many at most: its joints, size, probability and what it was not.
+/// One line a name, `most` names at most: its joints, size, probability and what it was not.
 fn names(explained: &Explained, most: usize) -> Vec<String> {
     if explained.effects.is_empty() {
         return vec![nothing_named(explained).to_string()];

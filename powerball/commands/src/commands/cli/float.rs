@@ -23,9 +23,9 @@ use std::path::{Path, PathBuf};
 const HAND: [f64; 2] = [300.0, 20.0];
 /// A hand may push with this part of each joint's torque before the driver's guard takes it for a drive that does not obey.
 pub(super) const PUSH: f64 = 0.4;
-/// Drift counts from so long after the hand let go, s.
+/// Drift counts from this long after the hand let go, s.
 const SETTLE: f64 = 1.0;
-/// Without a hand and without --for the virtual arm floats for so long, s.
+/// Without a hand and without --for the virtual arm floats for this long, s.
 const ALONE: f64 = 10.0;
 
 /// Take weight and friction off the hand that guides the arm, in the drives' current mode; an arm that rests is not pushed.
@@ -46,7 +46,7 @@ pub(crate) struct FloatCommand {
     /// A hand that pulls the virtual arm's joints along a path.
     #[arg(long, value_name = "FILE")]
     push: Option<PathBuf>,
-    /// Floats for so many seconds; else until Ctrl-C, or 10 s after the hand has let go.
+    /// Floats for this many seconds; else until Ctrl-C, or 10 s after the hand has let go.
     #[arg(long = "for", value_name = "SECONDS")]
     seconds: Option<f64>,
     /// Share of the friction that is taken off, 0 to 0.95.

@@ -81,7 +81,7 @@ pub(crate) struct FollowCommand {
     out: PathBuf,
 }
 
-/// One of the runs: its name, its model, and what it says of the path.
+/// One of the runs: its name, its model, and what it predicts for the path.
 struct Entry {
     name: &'static str,
     model: ModelArm,

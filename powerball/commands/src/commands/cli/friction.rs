@@ -212,7 +212,7 @@ fn page(arm: &str, found: &[JointFriction], notes: &[String]) -> Page {
     page.lead(
         "Mean torques at constant velocities where gravity does not load the joint. Laws are rated on \
         velocities that were left out of their fit, both directions of a velocity together; of laws that cannot be \
-        told apart tanh friction (Eq. 16) is taken.",
+        distinguished tanh friction (Eq. 16) is taken.",
     );
     for note in notes {
         page.paragraph(note);

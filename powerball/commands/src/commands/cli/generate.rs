@@ -39,8 +39,8 @@ pub(crate) struct Generate {
     /// The scalar of the controller.
     #[arg(long, value_enum, default_value = "f64")]
     scalar: ScalarName,
-    /// More functions of the rigid arm beside the inverse dynamics, separated by commas: those of `dyngen
-    /// generate`.
+    /// More functions of the rigid arm in addition to the inverse dynamics, separated by commas: those of
+    /// `dyngen generate`.
     #[arg(long, value_delimiter = ',', value_parser = function)]
     functions: Vec<Function>,
     /// Print what was written as one JSON object on standard output.

@@ -39,7 +39,7 @@ pub(crate) struct Identify {
     #[command(flatten)]
     map: MapArgument,
     /// What is known already: model.json of `powerball explain` for the same arm file. Inertial set and
-    /// friction are fitted beside its effects, which stay as they are. Logs of one mounting alone, no
+    /// friction are fitted in addition to its effects, which stay as they are. Logs of one mounting alone, no
     /// summaries.
     #[arg(long, value_name = "FILE.json")]
     model: Option<PathBuf>,
@@ -72,7 +72,7 @@ enum Friction {
     /// Two tanh steps and a viscous part (Eq. 16): γ1·tanh(γ2·q̇) + γ3·tanh(γ4·q̇) + γ5·q̇.
     #[default]
     Symmetric,
-    /// The same and a constant torque.
+    /// The symmetric friction and a constant torque.
     Asymmetric,
 }
 
@@ -82,8 +82,8 @@ enum EstimatorName {
     /// Least squares, every joint weighted by its noise.
     #[default]
     Weighted,
-    /// The same, and torque samples that the model cannot believe (knocks, spikes, brief collisions) count
-    /// less or nothing.
+    /// Weighted least squares in which torque samples that the model cannot believe (knocks, spikes, brief
+    /// collisions) count less or nothing.
     Robust,
     /// Instrumental variables: unbiased where positions are noisy. The regressor from every second sample of
     /// the positions, its instruments from those between.

@@ -70,7 +70,7 @@ fn size(text: &str) -> Result<u64, String> {
 }
 
 impl MapArgument {
-    /// The map of all that was said; logs are read within the memory that was said from then on.
+    /// The map of all that was given; from then on logs are read within the given memory.
     pub(crate) fn read(&self) -> Result<ColumnMap, Failure> {
         self.memory.into_iter().for_each(allow_memory);
         ColumnMap::said(&self.map).map_err(Failure::Unusable)
@@ -129,7 +129,7 @@ pub(crate) struct MountedLogs {
 }
 
 impl MountedLogs {
-    /// The same, the columns of all read so.
+    /// These logs, with the columns of all read by `map`.
     pub(crate) fn mapped(self, map: ColumnMap) -> MountedLogs {
         let map = Arc::new(map);
         let mapped = |of: Vec<Source<'static>>| of.into_iter().map(|s| s.mapped(Arc::clone(&map))).collect();

@@ -6,9 +6,9 @@ use powerball_bus::driver::lwa4p::LWA4P;
 use powerball_bus::transport::{self, Bus, BusUrl, Event, Interrupt};
 use powerball_logs::log::LiveSample;
 
-/// Looks for Ctrl-C so often, µs.
+/// Period at which Ctrl-C is looked for, µs.
 const LOOK: u64 = 100_000;
-/// Without a complete cycle for so long it is said that nothing is heard, µs.
+/// Without a complete cycle for this long it is reported that nothing is heard, µs.
 const SILENCE: u64 = 2_000_000;
 
 /// Hears the LWA 4P's process data and gives a sample a cycle, until Ctrl-C or `seconds` have passed; sends nothing.

@@ -182,7 +182,7 @@ impl Page {
 #[derive(Default)]
 struct History {
     messages: Vec<Bytes>,
-    /// So many after the first are gone.
+    /// Messages after the first that are gone.
     dropped: usize,
     waiting: Vec<Waker>,
 }

@@ -39,7 +39,7 @@ pub(crate) struct LogCommand {
     #[arg(short, long, value_name = "OUT")]
     out: Option<PathBuf>,
     /// A model, identified.json or model.json: an MCAP then has measured, predicted and residual torque of
-    /// each joint beside each other, in the band of the fit.
+    /// each joint next to each other, in the band of the fit.
     #[arg(long, value_name = "FILE.json", requires = "to")]
     model: Option<PathBuf>,
     /// Print what was found as one JSON object on standard output.
@@ -107,7 +107,7 @@ impl LogCommand {
         }
         match &file.log {
             Some(log) => write(log, arm, self.model.as_deref(), out),
-            // Why it is none is told below.
+            // Why it is no log is reported below.
             None => Ok(()),
         }
     }
@@ -201,9 +201,9 @@ fn table_lines(table: &InspectedTable, lines: &mut Vec<String>) {
     }
 }
 
-// `powerball log --to`: a log as another file, with what a model predicts beside it.
+// `powerball log --to`: a log as another file, with what a model predicts next to it.
 
-/// Writes a log; with a model as MCAP that has measured, predicted and residual torque beside each other.
+/// Writes a log; with a model as MCAP that has measured, predicted and residual torque next to each other.
 pub(super) fn write(log: &Log, arm: &Arm, model: Option<&Path>, out: &Path) -> Result<(), Failure> {
     replace::check_log(out, &[Path::new(&log.file)])?;
     let failed = |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", out.display()));

@@ -26,8 +26,8 @@ pub(crate) struct ModelOnBus {
     pub(crate) surroundings: Surroundings,
     #[command(flatten)]
     pub(crate) place: Where,
-    /// The virtual arm of --bus virtual with what no model is told of it: virtual_arm.json, as `powerball demo` writes it;
-    /// without, the file of that name next to the arm file, else the built-in arm.
+    /// The virtual arm of --bus virtual with what no model knows about it: virtual_arm.json, as `powerball
+    /// demo` writes it; without, the file of that name next to the arm file, else the built-in arm.
     #[arg(long, value_name = "FILE")]
     plant: Option<PathBuf>,
     #[command(flatten)]

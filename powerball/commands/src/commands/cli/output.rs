@@ -52,7 +52,7 @@ impl Progress {
         Progress { shown: std::io::stderr().is_terminal(), phases: None }
     }
 
-    /// The same, with times by phase on standard error when it ends.
+    /// As [`Self::new`], with times by phase on standard error when it ends.
     pub(crate) fn timed(timings: bool) -> Progress {
         let phases = timings.then(|| Mutex::new(vec![Phase::from_now("reading the arm file")]));
         Progress { phases, ..Progress::new() }
@@ -134,7 +134,7 @@ pub(crate) fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Failu
     write_file(&folder.join(name), bytes)
 }
 
-/// The same for a path.
+/// As [`write()`], for a path.
 pub(crate) fn write_file(target: &Path, bytes: &[u8]) -> Result<(), Failure> {
     replace::check(target, Some(bytes))?;
     files::write_whole(target, bytes).map_err(Failure::Unusable)
@@ -172,8 +172,8 @@ pub(crate) fn notes(count: usize) -> Option<String> {
 /// Whether a result that should not be used is taken nevertheless.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct Accept {
-    /// End with 0 instead of 3 where the result should not be used: columns or arm file are not what they are said to
-    /// be, a joint does not move or is predicted no better than by its mean (docs/exit_codes.md).
+    /// End with 0 instead of 3 where the result should not be used: columns or arm file are not what they are
+    /// declared to be, a joint does not move or is predicted no better than by its mean (docs/exit_codes.md).
     #[arg(long)]
     accept: bool,
 }
@@ -188,8 +188,9 @@ impl Accept {
     }
 }
 
-/// The first lines of a result: why it should not be used, and what there is to be said of the columns (`all` of it, or
-/// where they are not taken as they stand). That columns are wrong is the first reason, and its line says how.
+/// The first lines of a result: why it should not be used, and what there is to be reported about the columns
+/// (`all` of it, or where they are not taken as they stand). That columns are wrong is the first reason, and
+/// its line says how.
 pub(crate) fn first_lines(unusable: &[String], columns: Option<&Conventions>, all: bool) -> Vec<String> {
     let differ = columns.is_some_and(Conventions::differ);
     let verdict = columns.filter(|c| all || c.is_remarkable()).map(Conventions::verdict);

@@ -20,8 +20,8 @@ use std::path::PathBuf;
 /// answer1…answer6 (s from SYNC to the joint's data), and late, skipped, dropped (counts since it began).
 ///
 /// Each line is written whole: whatever happens, the log can be read up to there. A log whose name ends in
-/// .parquet or .mcap is written as lines beside it, NAME.parquet.csv, and becomes that when it ends; lines that a program left which died are put into NAME.interrupted-1.parquet by the next recording
-/// of that name.
+/// .parquet or .mcap is written as lines next to it, NAME.parquet.csv, and becomes that when it ends; lines
+/// that a program left which died are put into NAME.interrupted-1.parquet by the next recording of that name.
 ///
 /// Before the arm moves the trajectory is looked at as a whole, and so is the way to where it begins, each joint
 /// straight there from where the arm stands: limits of position, velocity, acceleration and torque, the floor, and
@@ -68,7 +68,8 @@ impl RecordCommand {
         }
         let mut log = Behind::new(log);
         let done = record(master, &motion, envelope, output::live(), &mut log);
-        // A recording that failed is closed too: what was recorded counts. Why it failed is what is told.
+        // A recording that failed is closed too: what was recorded counts. The reported error is why it
+        // failed.
         let (log, written) = log.close();
         let closed = written.and_then(|()| log.map_or(Ok(()), LogFile::close));
         let done = done.map_err(|e| match e {

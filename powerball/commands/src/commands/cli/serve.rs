@@ -112,7 +112,8 @@ impl Live {
         self.send(&json!({"kind": "event", "text": text}));
     }
 
-    /// Waits until so much real time has passed since the page was opened: a virtual bus has a clock of its own.
+    /// Waits until `seconds` of real time have passed since the page was opened: a virtual bus has a clock of
+    /// its own.
     pub(super) fn wait_until(&self, seconds: f64) {
         if self.is_open() && seconds.is_finite() && seconds > 0.0 {
             let left = Duration::from_secs_f64(seconds).saturating_sub(self.began.elapsed());

@@ -63,7 +63,7 @@ struct Written {
     /// Why it should not be used.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     unusable: Vec<String>,
-    /// Their ends, Hz.
+    /// The ends of the bands, Hz.
     bands: [f64; BANDS.len()],
     warnings: Vec<String>,
 }

@@ -24,7 +24,7 @@ pub(crate) struct VirtualArmCommand {
     /// The bus: socketcan:can0, slcan:/dev/ttyACM0 or udp:239.74.163.2:43113.
     #[arg(long, value_name = "URL")]
     bus: BusUrl,
-    /// Leaves the bus after so many seconds.
+    /// Leaves the bus after this many seconds.
     #[arg(long = "for", value_name = "SECONDS")]
     seconds: Option<f64>,
     /// Joint positions at the start, rad, six of them with commas between.
@@ -36,10 +36,10 @@ pub(crate) struct VirtualArmCommand {
     /// The drives have the current mode that the bus profile knows, for `powerball follow` and `float`.
     #[arg(long)]
     current_mode: bool,
-    /// An effect that no model is told of, by name; see `powerball demo`.
+    /// An effect that no model knows about, by name; see `powerball demo`.
     #[arg(long, value_name = "NAME")]
     effect: Option<String>,
-    /// The same as a file: virtual_arm.json, as `powerball demo` writes it beside its logs.
+    /// The effect as a file: virtual_arm.json, as `powerball demo` writes it next to its logs.
     #[arg(long, value_name = "FILE", conflicts_with = "effect")]
     plant: Option<PathBuf>,
     /// Draws the effect's size and the sensors' noise.

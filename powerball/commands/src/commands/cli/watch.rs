@@ -22,9 +22,9 @@ use std::path::PathBuf;
 /// a sensor's zero, a delay, or unknown).
 ///
 /// A line for each change, and a last one: `holds` or `changed`. The exit code is 0 where the model holds, 1 where
-/// something changed, 3 where that cannot be said. It is a sequential test: at most one false alarm in
-/// `--hours` of motion on average, as long as the model errs no more than on the logs it was explained on and
-/// friction stays within `--friction-range`. Rows at rest say nothing and are not watched.
+/// something changed, 3 where that cannot be determined. It is a sequential test: at most one false alarm in
+/// `--hours` of motion on average, as long as the model's error is no larger than on the logs it was
+/// explained on and friction stays within `--friction-range`. Rows at rest say nothing and are not watched.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Examples:\n  powerball watch --arm arm.toml --model result/model.json --log today.csv --json\n  \
@@ -47,7 +47,7 @@ pub(crate) struct WatchCommand {
     /// Nothing is sent.
     #[arg(long, value_name = "URL")]
     bus: Option<BusUrl>,
-    /// Listen to the bus for so many seconds; else until Ctrl-C.
+    /// Listen to the bus for this many seconds; else until Ctrl-C.
     #[arg(long = "for", value_name = "SECONDS", requires = "bus")]
     seconds: Option<f64>,
     #[command(flatten)]
@@ -69,7 +69,7 @@ pub(crate) struct WatchCommand {
     /// By what share of itself friction may wander without an alarm.
     #[arg(long, default_value_t = 0.02, value_parser = share)]
     friction_range: f64,
-    /// Where the model does not say what it leaves where it holds: so many seconds of motion are taken as good.
+    /// Where the model file does not state the usual residual: this many seconds of motion are taken as good.
     #[arg(long, default_value_t = 20.0, value_parser = positive)]
     learn: f64,
 }
@@ -97,7 +97,7 @@ impl WatchCommand {
         let said = Arm::read(&self.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
         let known = Known::read(&self.arm, Some(&self.model))?;
         let arm = known.arm.clone();
-        // Logs before the derivation: what cannot be read is said at once.
+        // Logs before the derivation: what cannot be read is reported at once.
         let logs = self.logs(&said, &map)?;
         let body = RigidArm::new(&arm).map_err(|e| Failure::Refused(e.to_string()))?;
         let model = known.model(&body)?;

@@ -1,4 +1,4 @@
-//! The same plant moved along a new path with the base model and with the explained one.
+//! The demo's plant moved along a new path with the base model and with the explained one.
 
 use super::{DemoError, Session, SessionError};
 use crate::commands::model_arm::{self, ModelArm};
@@ -24,7 +24,7 @@ const PERIOD: f64 = 8.5;
 const EVALUATIONS: usize = 50;
 /// Paths go up to the joints' limits, and an arm that is off its path passes them: this share of the velocities leaves room.
 const PACE: f64 = 0.8;
-/// A path may take more torque of a joint than it has, by one of the models; so many are tried.
+/// A path may take more torque of a joint than it has, by one of the models; this many are tried.
 const PATHS: u64 = 8;
 
 /// An arm that was moved with two models.
@@ -32,7 +32,7 @@ const PATHS: u64 = 8;
 pub struct Driven {
     /// Tracking errors and torques, `base` and `explained`.
     pub followed: Followed,
-    /// The same as tracks, in the order in which they were driven.
+    /// The runs as tracks, in the order in which they were driven.
     pub tracks: Vec<(&'static str, Track<6>)>,
     /// The path.
     pub path: DrivenPath<6>,
@@ -119,7 +119,8 @@ pub(super) fn drive(
     Ok(Driven { followed, tracks, path })
 }
 
-/// The first of the paths drawn that both models find within the joints' torques, and what they say of it.
+/// The first of the paths drawn that both models find within the joints' torques, and what they predict for
+/// it.
 fn path(
     models: &[&ModelArm; 2],
     session: &Session,

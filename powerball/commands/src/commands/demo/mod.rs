@@ -29,7 +29,7 @@ pub use verdict::{Judgement, Verdict, page};
 pub struct Demo {
     /// The recording session with the truth.
     pub session: Session,
-    /// What the residual loop says of the logs, which is all it was given.
+    /// What the residual loop finds in the logs, which are all that it was given.
     pub explained: Explained,
     /// Both compared.
     pub verdict: Verdict,

@@ -33,13 +33,13 @@ const PATHS: [(bool, f64); 8] = [
 ];
 /// The path, one to fit, during which something may begin.
 const BEGINS_IN: usize = 3;
-/// Between two logs the arm goes to where the next one begins: in so many seconds at least, and at this share
-/// of its velocity.
+/// Between two logs the arm goes to where the next one begins: in this many seconds at least, and at this
+/// share of its velocity.
 const PAUSE: f64 = 3.0;
 const SHARE: f64 = 0.5;
 /// Paths tried for each log: enough for a condition number near the best, in a fraction of a second.
 const EVALUATIONS: usize = 300;
-/// Paths are drawn so often where the arm is stopped on them.
+/// Paths are drawn this many times where the arm is stopped on them.
 const ATTEMPTS: u64 = 6;
 
 /// What was recorded.
@@ -49,7 +49,7 @@ pub struct Session {
     pub plant: Plant,
     /// What is in the plant and not in the model.
     pub effect: Effect,
-    /// The same as a file, with the arm's age at the end of the session.
+    /// The effect as a file, with the arm's age at the end of the session.
     pub undeclared: Undeclared,
     /// The arm file as the model knows it.
     pub arm_file: PathBuf,
@@ -125,7 +125,7 @@ impl Session {
         }
     }
 
-    /// The same along the paths of one attempt.
+    /// As [`Self::record`], along the paths of one attempt.
     fn record_along(folder: &Path, seed: u64, attempt: u64, named: &[&str]) -> Result<Session, SessionError> {
         let arm_file = folder.join("arm.toml");
         save(&arm_file, lwa4p::ARM_FILE)?;

@@ -30,9 +30,9 @@ pub struct Verdict {
     pub judgement: Judgement,
     /// The effect in the plant.
     pub truth: String,
-    /// Its joints, from 1; empty where it is the whole arm's.
+    /// The effect's joints, from 1; empty where it is the whole arm's.
     pub joints: Vec<usize>,
-    /// Its figures.
+    /// The effect's figures.
     pub figures: String,
     /// What was named: effect and joints.
     pub named: Vec<(String, Vec<usize>)>,
@@ -104,7 +104,7 @@ pub fn page(demo: &Demo) -> Page {
     let (session, explained, verdict) = (&demo.session, &demo.explained, &demo.verdict);
     let mut page = Page::new("What is wrong with this arm?");
     page.lead(
-        "A virtual LWA 4P has an effect that its model was not told of. It was recorded along exciting \
+        "A virtual LWA 4P has an effect that its model does not know about. It was recorded along exciting \
             paths, its base \
          model was identified, and the residual was explained from the logs alone.",
     );

@@ -23,8 +23,9 @@ pub use track::{Followed, Sample, TorqueParts, Touched, Track, TrackingError, co
 const APPROACH: f64 = 0.25;
 /// From a measurement at a SYNC to the middle of the cycle in which its torque acts, cycles.
 const AHEAD: f64 = 1.5;
-/// By so many cycles a set-point is ahead of the middle of the cycle in which the virtual drives are there: their cubic
-/// spline is two periods late, and a set-point waits for its SYNC. How late the LWA 4P's drives are is not known.
+/// By this many cycles a set-point is ahead of the middle of the cycle in which the virtual drives are there:
+/// their cubic spline is two periods late, and a set-point waits for its SYNC. How late the LWA 4P's drives
+/// are is not known.
 const LATE: f64 = 1.5;
 /// Momentum observer, rad/s.
 pub const OBSERVER: f64 = 30.0;
@@ -108,9 +109,10 @@ pub struct Run<'a, M, const N: usize> {
     pub path: &'a Path<N>,
     /// The rigid arm: its inertia shapes the gains, its torque is fed forward where `parts` are.
     pub arm: &'a M,
-    /// What the model says of the path; `None` for feedback alone.
+    /// What the model predicts for the path; `None` for feedback alone.
     pub parts: Option<&'a Parts<N>>,
-    /// What the best model that is known says of it: how far the arm may be off the path in current mode.
+    /// What the best model that is known predicts for it: how far the arm may be off the path in current
+    /// mode.
     pub best: &'a Parts<N>,
     /// How far, rad, a push may take a joint off the path next to that.
     pub give: f64,

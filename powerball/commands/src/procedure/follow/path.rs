@@ -1,4 +1,4 @@
-//! A path that is cleared to be driven, and what a model says of it.
+//! A path that is cleared to be driven, and what a model predicts for it.
 
 use crate::procedure::{Cleared, Envelope, RecordError};
 use nalgebra::SVector;
@@ -9,7 +9,7 @@ use powerball_logs::motion::Motion;
 /// Cycles at rest before and after a path, in which what is fed forward comes and goes.
 pub(super) const REST: usize = 100;
 
-/// What the model says of a path, a vector a sample, N·m.
+/// What the model predicts for a path, a vector a sample, N·m.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parts<const N: usize> {
     /// The rigid arm.
@@ -21,7 +21,7 @@ pub struct Parts<const N: usize> {
 }
 
 impl<const N: usize> Parts<N> {
-    /// Their sum at a time in samples.
+    /// The sum of the parts at a time in samples.
     pub(super) fn total(&self, at: f64) -> SVector<f64, N> {
         between(&self.rigid, at) + self.losses(at)
     }

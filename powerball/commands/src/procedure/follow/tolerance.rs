@@ -4,8 +4,8 @@
 use super::path::{Parts, between};
 use nalgebra::{SMatrix, SVector};
 
-/// Of the torques by the best model that is known, so much may be wrong: rigid arm and effects, here and now; and of each
-/// joint's torque.
+/// Of the torques by the best model that is known, this much may be wrong: rigid arm and effects, here and
+/// now; and of each joint's torque.
 const RIGID: f64 = 0.05;
 const EFFECTS: f64 = 0.25;
 const OF_LIMIT: f64 = 0.01;

@@ -63,7 +63,7 @@ impl<const N: usize> Track<N> {
         self.samples.iter().map(|s| s.q - path.at(at(s)).q).collect()
     }
 
-    /// The same as figures by joint.
+    /// The errors of [`Self::errors`] as figures by joint.
     #[must_use]
     pub fn error(&self, path: &Path<N>, delay: f64) -> TrackingError {
         let errors = self.errors(path, delay);

@@ -11,15 +11,15 @@ use powerball_logs::vector::dot;
 /// How a chosen group compares with the others on its joints.
 #[derive(Clone, Debug)]
 pub(crate) struct Comparison {
-    /// Its score over that of the next best name.
+    /// The name's score over that of the next best name.
     pub(crate) margin: f64,
     /// The next best names.
     pub(crate) rivals: Vec<Rival>,
     /// A name that fits as well.
     pub(crate) twin: Option<String>,
-    /// Its score over that of the next best name that explains something else of the same residual. A name
-    /// that explains the same part is another word for it; one that explains another part as well as this one
-    /// is a sign that neither is true.
+    /// The name's score over that of the next best one that explains something else of the same residual. A
+    /// name that explains the same part is another word for it; one that explains another part as well as
+    /// this one is a sign that neither is true.
     pub(crate) distinct_margin: f64,
     /// The joints on which they were compared.
     pub(crate) joints: Vec<JointNumber>,

@@ -25,7 +25,7 @@ pub struct Open {
 pub struct Hypothesis {
     /// The open name.
     pub name: &'static str,
-    /// Its joints.
+    /// The joints of the open name.
     pub joints: Vec<JointNumber>,
     /// All effects of the model, those of the open name last.
     candidates: Vec<Candidate>,
@@ -74,7 +74,7 @@ impl Hypothesis {
         torque
     }
 
-    /// The same name fitted to other data.
+    /// This name fitted to other data.
     #[must_use]
     pub fn fitted_to(&self, data: &Data<'_>, folds: &Folds) -> Hypothesis {
         let mut candidates = self.candidates.clone();
@@ -163,7 +163,7 @@ pub(crate) struct Step {
 /// What the steps decided so far.
 #[derive(Debug, Default)]
 pub(crate) struct History {
-    /// Those whose effects stand.
+    /// Steps whose effects are still in the model.
     pub(crate) steps: Vec<Step>,
     /// Names that steps left open.
     pub(crate) questions: Vec<Question>,
@@ -205,7 +205,7 @@ impl Question {
         Question::of(rule, [&groups[chosen], &groups[twin]], joints, Why::Twin)
     }
 
-    /// The same where the name is not given.
+    /// This question, for a name that is not given.
     pub(crate) fn withheld(self) -> Question {
         Question { why: Why::Withheld, ..self }
     }

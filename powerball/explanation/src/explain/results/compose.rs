@@ -146,7 +146,7 @@ fn parts(study: &Study<'_>, found: &Model, validation_only: &[ValidationOnlyEffe
     parts
 }
 
-/// Eq. 16 by joint, with the errors of its levels; those of its steepnesses are not told.
+/// Eq. 16 by joint, with the errors of its levels; those of its steepnesses are not reported.
 fn friction(found: &Model) -> Vec<JointFriction> {
     let (errors, layout) = (found.errors(), found.fit.design.layout);
     let of_joint = |j: usize| {

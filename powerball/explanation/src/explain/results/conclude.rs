@@ -272,8 +272,8 @@ pub(crate) fn warnings(findings: &Findings<'_>) -> Vec<String> {
     let unseen: Vec<&str> = names.filter(|(c, _)| !is_seen(*c)).map(|(_, name)| name.as_str()).collect();
     if !unseen.is_empty() {
         warnings.push(format!(
-            "these logs do not determine {}: an effect that resembles them cannot be told from them; \
-             record a motion that excites them (powerball excite)",
+            "these logs do not determine {}: an effect that resembles them cannot be distinguished from \
+             them; record a motion that excites them (powerball excite)",
             unseen.join("; ")
         ));
     }

@@ -1,6 +1,6 @@
 //! What an explanation says; serialized it is explained.json.
 //!
-//! Also here: what is said of an experiment that tells names apart, and the plot that shows an effect.
+//! Also here: what is reported about an experiment that tells names apart, and the plot that shows an effect.
 
 use super::super::comparison::Open;
 use super::super::model::Model;
@@ -93,7 +93,7 @@ pub struct Explained {
 }
 
 impl Explained {
-    /// The same with what the columns are, and with why it should not be used.
+    /// Adds what the columns are, and why the result should not be used.
     #[must_use]
     pub fn with_columns(mut self, columns: Conventions) -> Explained {
         // Of which no more than noise is left is no useless joint.
@@ -118,11 +118,11 @@ pub struct Change {
     pub joint: JointNumber,
     /// rms after over rms before, less 1.
     pub rms: f64,
-    /// Its 95 % interval, from blocks that count as independent.
+    /// 95 % interval of the change, from blocks that count as independent.
     pub interval: [f64; 2],
 }
 
-// What is said of an experiment that tells names apart.
+// What is reported about an experiment that tells names apart.
 
 /// What to record to tell names apart that logs leave open.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -144,7 +144,7 @@ pub enum Trajectory {
     NotDesigned {},
     /// None could be found.
     None {
-        /// Always `None`: null in explained.json, beside the reason.
+        /// Always `None`: null in explained.json, next to the reason.
         trajectory: Option<&'static str>,
         /// Why.
         no_trajectory: String,
@@ -153,13 +153,13 @@ pub enum Trajectory {
     Designed {
         /// The joints that the names are of.
         joints: Vec<JointNumber>,
-        /// Its file's name.
+        /// Name of the trajectory's file.
         trajectory: &'static str,
         /// rms of the difference that would stay, over the residual's own rms, by joint.
         expected_difference: Vec<f64>,
         /// χ² by which the wrong name would fall behind.
         expected_evidence: f64,
-        /// The same of the middle one of random paths.
+        /// The expected evidence of the median random path.
         of_a_usual_path: f64,
         /// How long it takes, s.
         duration: f64,
@@ -171,7 +171,7 @@ pub enum Trajectory {
 pub struct Experiment {
     /// The names that were open.
     pub to_tell_apart: Vec<&'static str>,
-    /// Its log.
+    /// The log of the experiment.
     pub log: String,
     /// The name that is right; `None` where the logs cannot say.
     pub decided: Option<&'static str>,
@@ -208,7 +208,7 @@ impl NextExperiment {
 /// An effect on one joint, seen on the fitted logs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shown {
-    /// Its name.
+    /// The effect's name.
     pub effect: String,
     /// The joint.
     pub joint: JointNumber,
@@ -219,7 +219,8 @@ pub struct Shown {
     /// By row: the signal; the residual of the model without this effect but with all others; that with it;
     /// what it adds.
     pub rows: Vec<[f64; 4]>,
-    /// The same as means over equal shares of the rows, in the order of the signal; none over time.
+    /// The columns of `rows` as means over equal shares of the rows, in the order of the signal; none over
+    /// time.
     pub means: Vec<[f64; 4]>,
 }
 
@@ -227,7 +228,7 @@ pub struct Shown {
 const MEANS: usize = 24;
 /// Joints shown of an effect that acts on several.
 const JOINTS: usize = 2;
-/// What builds up over a way is seen within so many of it.
+/// What builds up over a way is seen within this many times the way.
 const WAYS: f64 = 10.0;
 /// Steps of the encoders look like turning back; a joint turns back when it has come this far the other way,
 /// rad or m.
@@ -308,7 +309,7 @@ fn in_words(axis: Axis, joint: usize, context: &Context<'_>) -> String {
         Axis::Cycle(order) => format!("place within a cycle, {order:.1} cycles a turn [cycles]"),
         Axis::Velocity(j) => format!("velocity of joint {j} [{}/s]", unit(j)),
         Axis::Torque => "torque of the rigid arm [N·m]".to_string(),
-        Axis::Load => "size of the torque that the rigid arm asks of the joint [N·m]".to_string(),
+        Axis::Load => "size of the torque that the rigid arm requires at the joint [N·m]".to_string(),
         Axis::Travel(_) => {
             format!("way since the joint turned back [{}]", unit(JointNumber::from_index(joint)))
         }

@@ -14,10 +14,10 @@ use powerball_controller::JointNumber;
 use powerball_logs::regression::{Data, Signals};
 use serde::Serialize;
 
-/// What is said of one log.
+/// What is reported about one log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LogResult {
-    /// Its file.
+    /// The log's file.
     pub log: String,
     /// Whether nothing was found in it that other logs have not, and the model predicts it as well as them.
     pub like_the_others: bool,
@@ -220,7 +220,7 @@ impl LogResult {
             let value = d.value.map_or_else(String::new, |value| format!(" of {value:+.4}"));
             let share = 100.0 * d.share;
             format!(
-                "{}{value} on joint {} from {:.1} to {:.1} s ({share:.0} % of what it errs more)",
+                "{}{value} on joint {} from {:.1} to {:.1} s ({share:.0} % of its additional error)",
                 d.effect,
                 joints.join(", "),
                 d.start_time,

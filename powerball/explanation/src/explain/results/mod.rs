@@ -1,4 +1,4 @@
-//! What is said of what was found.
+//! What is reported about the findings.
 //!
 //! `conclude` makes the result ([`Explained`], in `explained` with its plots and what an experiment would decide) and the
 //! warnings that a reader must know: `compose` the model of what was accepted and what that leaves, `unattributed` what stays

@@ -27,8 +27,8 @@ pub struct Unattributed {
     pub considered: Vec<Rival>,
 }
 
-/// The joints of which more than little is left that depends on something, and what is to be said of the others on
-/// which more than noise is left.
+/// The joints of which more than little is left that depends on something, and what is to be reported about
+/// the others on which more than noise is left.
 pub(crate) fn unattributed(
     study: &Study<'_>,
     model: &Model,
@@ -105,7 +105,7 @@ impl Dependencies {
         Dependencies(by_joint.collect())
     }
 
-    /// Those of a joint, the strongest first, with the share of its variance.
+    /// The dependencies of a joint, the strongest first, with the share of its variance.
     pub(crate) fn of(&self, joint: usize) -> &[(String, f64)] {
         self.0.iter().find(|(j, _)| *j == joint).map_or(&[], |(_, list)| list.as_slice())
     }

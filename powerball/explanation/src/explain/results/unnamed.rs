@@ -14,11 +14,11 @@ pub struct UnnamedLaw {
     /// As text: `tau2 = c1·q2·q3 + …`; tau in N·m, positions and velocities in rad and rad/s (m and m/s where
     /// a joint slides).
     pub formula: String,
-    /// The same for LaTeX.
+    /// The formula for LaTeX.
     pub latex: String,
     /// The joints that feel it.
     pub joints: Vec<JointNumber>,
-    /// Its coefficients, in order.
+    /// The law's coefficients, in order.
     pub coefficients: Vec<LawCoefficient>,
     /// The change of the rms error on the validation set by it, by joint: with it over without it, less 1.
     pub held_out_change: Vec<f64>,
@@ -52,11 +52,11 @@ impl UnnamedLaw {
 pub struct LawCoefficient {
     /// As in the formula.
     pub name: String,
-    /// Its value.
+    /// The coefficient's value.
     pub value: f64,
-    /// Its standard error.
+    /// The standard error of the value.
     pub std: f64,
-    /// Its unit.
+    /// The unit of the value.
     pub unit: &'static str,
 }
 

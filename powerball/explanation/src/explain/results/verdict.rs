@@ -240,10 +240,10 @@ fn is_named(explained: &Explained, name: &str, joints: &[JointNumber]) -> bool {
 
 // How often a name with such evidence is right: a curve that was fitted to arms whose effects are known.
 
-/// What is known of a name besides what it is.
+/// What is known of a name in addition to what it stands for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Evidence {
-    /// Its penalised gain over that of the next best name.
+    /// The name's penalised gain over that of the next best name.
     pub margin: f64,
     /// Whether another name fits as well.
     pub alike: bool,

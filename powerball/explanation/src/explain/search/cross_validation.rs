@@ -1,10 +1,10 @@
 //! What speaks for a candidate that takes much of an error away, on logs that hold few seconds.
 //!
-//! A small effect needs many blocks and folds to be told from chance; one that lowers an error by a tenth and
-//! more is told by few seconds. It is judged both ways round: fitted to the logs and judged on the validation
-//! set, fitted to the validation set and judged on the logs; each time the squared error must fall by a share
-//! that chance does not give, and both must say the same. Significance is that of blocks as long as the
-//! residual's own memory.
+//! A small effect needs many blocks and folds to be distinguished from chance; one that lowers an error by a
+//! tenth and more needs only a few seconds. It is judged both ways round: fitted to the logs and judged on
+//! the validation set, fitted to the validation set and judged on the logs; each time the squared error must
+//! fall by a share that chance does not give, and both must say the same. Significance is that of blocks as
+//! long as the residual's own memory.
 
 use super::super::model::Model;
 use super::super::study::Study;
@@ -19,7 +19,7 @@ use powerball_logs::vector::dot;
 #[derive(Debug)]
 pub(crate) struct CrossValidation {
     fit: Fit,
-    /// Its columns on the logs that the model was fitted to.
+    /// The model's columns on the logs that the model was fitted to.
     design: Design,
     /// What it leaves there.
     residual: Signals,

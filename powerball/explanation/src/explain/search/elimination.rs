@@ -80,7 +80,7 @@ pub(crate) fn gains(model: &Model) -> Vec<f64> {
     falls(model, &columns)
 }
 
-/// The same for sets of columns.
+/// As [`gains`], for sets of columns.
 fn falls(model: &Model, sets: &[Vec<usize>]) -> Vec<f64> {
     let normal = model.fit.normal_equations();
     let error = |without: &dyn Fn(usize) -> bool| {
@@ -95,7 +95,7 @@ fn falls(model: &Model, sets: &[Vec<usize>]) -> Vec<f64> {
 
 /// What speaks for a part of the model, everything else refitted.
 struct Needed {
-    /// Its place among what was accepted.
+    /// The part's place among what was accepted.
     place: usize,
     evidence: Evidence,
     /// By how much the logarithm of the squared error rises without it on logs that took no part in the fit,
@@ -125,7 +125,7 @@ pub(crate) fn keep_needed(study: &Study<'_>, model: &mut Model) {
         for &place in &baseline {
             match needed(study, model, place) {
                 Some(needed) => found.push(needed),
-                // It cannot be told from the rest.
+                // It cannot be distinguished from the rest.
                 None => useless = Some(place),
             }
         }
@@ -259,7 +259,7 @@ fn moved(
     (candidate != accepted.candidate).then_some((candidate, best))
 }
 
-/// The same effect with other settings: those near by, in the first round all.
+/// A candidate's effect with other settings: those near by, in the first round all.
 fn other_settings(context: &Context<'_>, candidate: &Candidate, share: f64) -> Vec<Candidate> {
     let effect = candidate.effect();
     let mut others = effect.neighbours(candidate, share);

@@ -23,7 +23,7 @@ pub(crate) struct Evidence {
     pub(crate) p_value: f64,
     /// Share by which the held-out squared error of the candidate's joints falls, by fold.
     pub(crate) fold_gains: Vec<f64>,
-    /// The same on the validation set: the median over its logs.
+    /// That share on the validation set: the median over its logs.
     pub(crate) validation_gain: f64,
     /// Of an event: how much of what its time has more than other times of squared error stays; 1 and more where that
     /// time has no more than others.
@@ -46,7 +46,7 @@ pub(crate) enum Extent {
     Everywhere,
     /// In some logs, for most of their time.
     SomeLogs,
-    /// For a while of so many seconds: too short for blocks and folds.
+    /// For this long, s: too short for blocks and folds.
     Short(f64),
 }
 
@@ -64,7 +64,7 @@ impl Extent {
 /// The validation set, prepared for one base model.
 #[derive(Debug)]
 pub(crate) struct Validation<'p> {
-    /// Its data.
+    /// The data of the validation set.
     pub(crate) data: &'p Data<'p>,
     /// The base's columns on it.
     pub(crate) design: Design,
@@ -222,7 +222,8 @@ fn event_gains(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]) ->
     (0..EVENT_PARTS).filter_map(gain).collect()
 }
 
-/// See [`Evidence::event_left`]. Other times are told by the median over blocks, so that other events do not count.
+/// See [`Evidence::event_left`]. Other times are represented by the median over blocks, so that other events
+/// do not count.
 fn event_left(screen: &Screen<'_>, trial: &Trial, after: &[Vec<f64>]) -> f64 {
     let (data, fit) = (screen.context.data, screen.context.fit);
     let (mut excess, mut stays) = (0.0, 0.0);

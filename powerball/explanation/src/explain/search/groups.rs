@@ -1,4 +1,4 @@
-//! The best candidates of every effect, and which of them may stand beside each other and beside what was
+//! The best candidates of every effect, and which of them may be in the model together and with what was
 //! accepted.
 
 use super::super::model::{Accepted, Model};
@@ -56,7 +56,7 @@ impl Group {
         best(self.on(joints)).and_then(|m| m.refusal.clone())
     }
 
-    /// Its best member.
+    /// The group's best member.
     pub(crate) fn best(&self) -> Option<&Member> {
         best(self.members.iter())
     }
@@ -153,8 +153,8 @@ fn best_by_joint(screen: &Screen<'_>, candidates: Vec<Candidate>) -> Vec<Member>
     members
 }
 
-/// Members that do not exclude each other: the best one that acts on several joints with what goes beside
-/// it, or those of single joints, whichever explain more.
+/// Members that do not exclude each other: the best one that acts on several joints with what is possible
+/// with it, or those of single joints, whichever explain more.
 fn compatible(screen: &Screen<'_>, mut members: Vec<Member>) -> Vec<Member> {
     let rule = screen.context.rule;
     members.sort_by(|a, b| b.trial.score.total_cmp(&a.trial.score));
@@ -192,7 +192,7 @@ fn without_repeats(screen: &Screen<'_>, members: Vec<Member>) -> Vec<Member> {
     let (mut columns, mut gain) = (Vec::new(), 0.0);
     let added = |mut member: Member| {
         if member.trial.score < least {
-            // Refused for that, and told so.
+            // Refused for that, with this reason.
             return Some(member);
         }
         let own = member.trial.columns.len();
@@ -222,12 +222,12 @@ fn untested_refusal(
         return Some((format!("explains too little (score {:.1})", member.trial.score), true));
     }
     if study.one_path && candidate.effect().is_function_of_path(candidate, &study.data, rule) {
-        let why = "the logs to judge on run the same path: a function of the path cannot be told there \
-            from any other misfit; record another path";
+        let why = "the logs to judge on run the same path: a function of the path cannot be distinguished \
+            there from any other misfit; record another path";
         return Some((why.to_string(), false));
     }
     if model.gave_up(candidate) {
-        return Some(("did not last, or could not be told from its rivals".to_string(), true));
+        return Some(("did not last, or could not be distinguished from its rivals".to_string(), true));
     }
     if let Some(name) = would_absorb(model, screen, member) {
         return Some((format!("gains too little to take the place of {name}"), true));
@@ -270,10 +270,11 @@ fn begins_with(earlier: &Candidate, event: &Candidate, same_event: f64) -> bool 
 }
 
 /// The accepted effect of which a member would only mend the law: on the joints where no accepted effect
-/// is large beside it, it would not count.
+/// is large compared with it, it would not count.
 fn only_corrects(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<&'static str> {
     let (rule, effect) = (screen.context.rule, member.candidate.effect());
-    // An event corrects nothing that lasts; but an event beside the beginning of another one corrects its time.
+    // An event corrects nothing that lasts; but an event next to the beginning of another one corrects its
+    // time.
     let baseline = |a: &Accepted| begins_with(&a.candidate, &member.candidate, rule.same_event);
     let lasting: Vec<&Accepted> =
         model.accepted.iter().filter(|a| a.candidate.windows.is_empty() || baseline(a)).collect();
@@ -294,7 +295,7 @@ fn only_corrects(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<
     corrected.filter(|_| rest < rule.least_score)
 }
 
-/// What the evidence for members is asked of.
+/// What the evidence for members is computed from.
 pub(crate) struct Tester<'t> {
     pub(crate) study: &'t Study<'t>,
     pub(crate) screen: &'t Screen<'t>,
@@ -305,7 +306,7 @@ pub(crate) struct Tester<'t> {
     pub(crate) on_validation: &'t Context<'t>,
     /// The model that is judged.
     pub(crate) model: &'t Model,
-    /// The same fitted to the validation set, once it is asked for.
+    /// The judged model fitted to the validation set, once that is needed.
     pub(crate) cross_validation: OnceLock<CrossValidation>,
 }
 

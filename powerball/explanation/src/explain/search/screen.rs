@@ -30,9 +30,9 @@ pub(crate) struct Screen<'c> {
 /// A candidate tried on the base.
 #[derive(Clone, Debug)]
 pub(crate) struct Trial {
-    /// Its columns.
+    /// The candidate's columns.
     pub(crate) columns: Vec<Column>,
-    /// Its coefficients.
+    /// The candidate's coefficients.
     pub(crate) theta: Vec<f64>,
     /// For each of its columns: the base columns' shares in it.
     pub(crate) base: Vec<Vec<f64>>,
@@ -42,7 +42,7 @@ pub(crate) struct Trial {
     pub(crate) score: f64,
 }
 
-/// What columns explain beside the base; a [`Trial`] without its columns.
+/// What columns explain in addition to the base; a [`Trial`] without its columns.
 #[derive(Clone, Debug)]
 pub(super) struct Solved {
     theta: Vec<f64>,
@@ -63,7 +63,7 @@ impl<'c> Screen<'c> {
         Screen::without(context, 0..0)
     }
 
-    /// The same without some of the model's columns, of whose torque the context's residual is free.
+    /// As [`Self::new`], without some of the model's columns, of whose torque the context's residual is free.
     #[must_use]
     pub(crate) fn without(context: &'c Context<'c>, columns: Range<usize>) -> Screen<'c> {
         let fit = context.fit;
@@ -124,7 +124,7 @@ impl<'c> Screen<'c> {
         products
     }
 
-    /// What columns explain beside the base, from their products.
+    /// What columns explain in addition to the base, from their products.
     pub(super) fn solve(&self, products: &Added, searched: f64) -> Option<Solved> {
         let (base, rest) = products.without_base(&self.solver);
         let score: Vec<f64> =

@@ -31,8 +31,8 @@ struct Surrogate {
     score: f64,
 }
 
-/// The score that trials must exceed to be told from chance: that of most of their surrogates. A push that is shifted in
-/// time may fall onto another one: of what is short, most must score less, not all.
+/// The score that trials must exceed to be distinguished from chance: that of most of their surrogates. A
+/// push that is shifted in time may fall onto another one: of what is short, most must score less, not all.
 #[must_use]
 pub(crate) fn level_by_chance(screen: &Screen<'_>, trials: &[&Trial], short: bool, seed: u64) -> f64 {
     let rule = screen.context.rule;
@@ -300,7 +300,8 @@ impl Transformed {
         Transformed { inverse: planner.plan_fft_inverse(values.len()), forward, spectrum }
     }
 
-    /// Calls `use_it` with the place of every partner and with its product with this part shifted by so many rows.
+    /// Calls `use_it` with the place of every partner and with its product with this part, shifted by a
+    /// number of rows.
     fn correlate(&self, partners: &[&[f64]], mut use_it: impl FnMut(usize, &dyn Fn(usize) -> f64)) {
         let n = self.spectrum.len();
         // Two real signals in one transform: one is its real part, the other its imaginary part.

@@ -1,4 +1,4 @@
-//! What is special of some logs, found before and beside the search.
+//! What is special in some logs, found before the search and apart from it.
 //!
 //! A validation set that repeats the path of the fitted logs cannot judge functions of that path
 //! (`one_path`); there a fit of each joint by itself may predict better than one multibody model, and where the times of

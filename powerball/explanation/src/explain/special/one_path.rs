@@ -66,7 +66,7 @@ pub(crate) fn predicts_better(model: (&Study<'_>, &Model), rival: (&Study<'_>, &
 // Times that start anew in each file say nothing of when a file was recorded; the order of the files is
 // taken for it, and the logs of `--validate` then come after those of `--log`. But they may as well have
 // been recorded in between (every other repeat is held out, say), and a series of repeats that starts from
-// another place may have been begun with a cold arm. What warms up tells these apart: the one that it fits
+// another place may have started with a cold arm. What warms up tells these apart: the one that it fits
 // best is taken.
 
 /// When logs were recorded.
@@ -74,7 +74,7 @@ pub(crate) fn predicts_better(model: (&Study<'_>, &Model), rival: (&Study<'_>, &
 pub(crate) enum Clock {
     /// As their times or their order say.
     AsGiven,
-    /// Those to judge on in between the fitted ones.
+    /// The logs to judge on lie in between the fitted ones.
     InBetween,
     /// Every series of repeats from the same place began with a cold arm, and those to judge on were recorded
     /// in between.
@@ -93,7 +93,7 @@ impl Clock {
             ),
             Clock::ColdSeries => Some(
                 "the times of the logs start anew in each file: every series of runs from the same start is \
-                    taken to have begun with a cold arm, \
+                    taken to have started with a cold arm, \
                  because what warms up fits that better than one running time through all files does",
             ),
         }

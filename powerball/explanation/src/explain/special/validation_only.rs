@@ -21,7 +21,7 @@ const SEED: u64 = 7;
 /// What is in logs of the validation set only, or in all that are fitted.
 #[derive(Clone, Debug)]
 pub(crate) struct ValidationOnlyEffect {
-    /// What is said of it.
+    /// What is reported about it.
     pub(crate) named: NamedEffect,
     /// One entry a window or body.
     pub(crate) parts: Vec<ValidationOnlyPart>,
@@ -34,7 +34,8 @@ pub(crate) struct ValidationOnlyPart {
     pub(crate) part: Part,
     /// Where it is.
     pub(crate) windows: Vec<Window>,
-    /// Its torque on the fitted logs and on the validation set, which was taken out there, by joint and row, N·m.
+    /// Torque of the part on the fitted logs and on the validation set, which was taken out there, by joint
+    /// and row, N·m.
     pub(crate) torque: [Signals; 2],
 }
 
@@ -203,7 +204,8 @@ fn taken_out<'a>(
     Some((with_torques(rule, pooled, seen, named, torques), without))
 }
 
-/// What is said of what was seen of an effect, with what is left on the validation set before and after.
+/// What is reported about what was seen of an effect, with what is left on the validation set before and
+/// after.
 fn named(
     rule: &Rule,
     pooled: &Pooled<'_>,
@@ -266,7 +268,7 @@ fn with_torques(
     ValidationOnlyEffect { named, parts }
 }
 
-/// The best candidate on all logs beside what was seen already, if the rule accepts it.
+/// The best candidate on all logs in addition to what was seen already, if the rule accepts it.
 fn look(rule: &Rule, pooled: &Pooled<'_>) -> Option<Seen> {
     let context = Context::new(&pooled.data, &pooled.fit, &pooled.fit.residual, rule);
     let screen = Screen::new(&context);
@@ -298,7 +300,7 @@ impl Seen {
         Found { candidate: &self.candidate, coefficients: &self.coefficients }
     }
 
-    /// Its torque on some logs, by joint and row, N·m.
+    /// The effect's torque on some logs, by joint and row, N·m.
     fn torque(&self, data: &Data<'_>, base: &Fit, rule: &Rule) -> Signals {
         let mut torque = Signals::zeros(data);
         let context = Context::for_columns(data, base, rule);
@@ -314,8 +316,8 @@ impl Seen {
 }
 
 impl Pooled<'_> {
-    /// Takes in what was seen, and fits all of it beside the base model until its settings follow from its
-    /// coefficients.
+    /// Takes in what was seen, and fits all of it together with the base model until its settings follow from
+    /// its coefficients.
     fn take(&mut self, rule: &Rule, seen: Seen) {
         self.seen.push(seen);
         for _ in 0..ROUNDS {
@@ -359,7 +361,7 @@ fn oddness(base: &Fit, other: &Data<'_>, residual: &[Vec<f64>], log: usize) -> f
 }
 
 /// Whether what was seen is what makes its logs odd: without its torque little of their excess over the fitted logs is
-/// left, and no joint's error is larger. A base model that errs on a new path makes them odd as
+/// left, and no joint's error is larger. A base model that is wrong on a new path makes them odd as
 /// well, and what fits best there only resembles that error.
 fn makes_it_odd(
     rule: &Rule,

@@ -1,4 +1,4 @@
-//! Torques that no effect of the library is: told as a formula, and no name is given in their place.
+//! Torques that are no effect of the library: reported as a formula, and no name is given in their place.
 
 use super::numbered;
 use super::plant::{Noise, Truth, arm, record};
@@ -7,7 +7,7 @@ use crate::explain::{Explained, explain_body};
 use powerball_logs::log::Log;
 use powerball_logs::regression::RigidArm;
 
-/// Clean logs with so many N·m more on a joint (from 0), a function of all positions.
+/// Clean logs with `torque` N·m added on a joint (from 0), a function of all positions.
 fn explained(joint: usize, torque: impl Fn(&[f64]) -> f64) -> Explained {
     let body = RigidArm::new(&arm()).unwrap();
     let mut logs: Vec<Log> = record(body.arm(), Truth::Clean, 0.0, Noise::White, 7, 22.0, 5);
@@ -24,7 +24,7 @@ fn explained(joint: usize, torque: impl Fn(&[f64]) -> f64) -> Explained {
 /// A hose over joints 2 and 3 and a counterweight linkage: the formula is the true one, its coefficients are
 /// within four standard errors of it, and nothing is left.
 #[test]
-fn a_torque_of_two_positions_is_told_as_its_formula() {
+fn a_torque_of_two_positions_is_reported_as_its_formula() {
     let hose = explained(1, |q| 6.0 * (q[1] - 0.3) * (q[2] + 0.5));
     let linkage = explained(2, |q| 5.0 * (q[1] + q[2] + 0.4).sin());
     for (explained, joint, starts, true_values) in [

@@ -67,7 +67,7 @@ fn explain_needs_nothing_prepared() {
     let body = RigidArm::new(&arm()).unwrap();
     let mut logs = record(body.arm(), Truth::Temperature, 1.0, Noise::White, 7, 22.0, 3);
     common_clock(&mut logs);
-    // It asks besides what the columns are.
+    // It also checks what the columns are.
     let json = |explained: &Explained| Explained { conventions: None, ..explained.clone() };
     let json = |explained: &Explained| serde_json::to_value(json(explained)).unwrap();
     let prepared = explain_body(&body, &logs[..5], &logs[5..], &ExplainOptions::default()).unwrap();

@@ -49,7 +49,7 @@ fn scara() -> (Arm, Plant) {
     (arm, plant)
 }
 
-/// An arm with so much friction and white noise by joint, N·m or N.
+/// An arm with given friction and white noise by joint, N·m or N.
 fn plant(arm: &Arm, bodies: Vec<Body>, levels: &[f64], white: &[f64]) -> Plant {
     let friction = |level: &f64| TanhFriction::new([0.7 * level, 60.0, 0.3 * level, 4.0, *level]);
     let sensors = Sensors {
@@ -68,7 +68,7 @@ fn explained(arm: (Arm, Plant), effect: Effect, listed: &[usize]) -> Explained {
     explained_of(arm, &[(effect, listed)])
 }
 
-/// The same with several effects, each in logs of its own.
+/// As [`explained`], with several effects, each in logs of its own.
 fn explained_of((arm, usual): (Arm, Plant), effects: &[(Effect, &[usize])]) -> Explained {
     explained_logs(&arm, recorded(&arm, &usual, effects))
 }
@@ -261,7 +261,7 @@ fn a_push_of_another_shape_is_one_push_that_leaves_nothing() {
 
 /// Two pushes with a pause of 0.7 s are two, each with its own force.
 #[test]
-fn pushes_close_to_each_other_are_told_apart() {
+fn pushes_close_to_each_other_are_distinguished() {
     let push = |force, start| Effect::ContactWrench { force, start, length: 1.0, every: 1e3 };
     let pushes = [push([2.0, 6.0, 0.0], 6.0), push([6.0, -2.0, 0.0], 7.7), push([3.0, 6.0, 0.0], 12.0)];
     let [a, b, c] = pushes.map(|push| (push, &[2usize][..]));
@@ -482,10 +482,10 @@ fn a_touch_of_an_arm_that_stands_still_is_seen_and_a_brake_is_not() {
     approx::assert_relative_eq!(size, FORCE, max_relative = 0.1);
 }
 
-/// What is another in a single log, fitted or for validation, is told of that log with its figure, and nothing of the
-/// others.
+/// What is another in a single log, fitted or for validation, is reported for that log with its figure, and
+/// nothing of the others.
 #[test]
-fn what_is_another_in_one_log_is_told_of_that_log() {
+fn what_is_another_in_one_log_is_reported_for_that_log() {
     let (arm, plant) = planar();
     let usual = recorded(&arm, &plant, &[]);
     assert!(explained_logs(&arm, usual.clone()).logs.iter().all(|log| log.like_the_others));

@@ -24,7 +24,7 @@ fn links() -> Vec<Body> {
     links
 }
 
-/// Logs as the base stood, reduced for the mounting that they are told to be of.
+/// Logs as the base stood, reduced for the mounting that is stated.
 fn reduced(stood: &str, stated: &str, seed: u64, still: &[usize]) -> (RigidArm, Bands) {
     let arm = lwa4p::arm().unwrap();
     let [stood, stated] = [stood, stated].map(|text| text.parse::<Mounting>().unwrap());
@@ -95,7 +95,7 @@ fn friction_comes_from_the_mounting_in_which_a_joint_moves() {
     }
 }
 
-/// A mounting that is told wrong does not go by in silence.
+/// A mounting that is stated wrongly is reported.
 #[test]
 fn a_wrong_mounting_contradicts_the_others() {
     let right = reduced("filed", "filed", 1, &[]);

@@ -23,7 +23,7 @@ fn a_reduced_fit_is_the_fit_of_the_rows() {
     let direct = fit(&data, &Folds::new(&data), &[], None);
     let errors = crate::estimate::standard_errors(&reduced);
     for (c, (a, b)) in reduced.theta.iter().zip(&direct.theta).enumerate() {
-        // The weights' colour is told from slow octaves here, from means over a second there.
+        // The weights' colour is estimated from slow octaves here, from means over a second there.
         let Some(std) = errors.std[c] else { continue };
         assert!((a - b).abs() < 0.3 * std.max(1e-6), "{c}: {a} {b} ± {std}");
     }

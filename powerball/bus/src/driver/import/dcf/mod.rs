@@ -51,7 +51,7 @@ pub enum Access {
 /// One variable of the dictionary.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variable {
-    /// Its name in the file.
+    /// The variable's name in the file.
     pub name: String,
     /// CiA 301 data type: 0x0005 is u8, and so on.
     pub data_type: u16,
@@ -109,7 +109,7 @@ impl Dcf {
         for section in &sections {
             dcf.take(section, &types)?;
         }
-        // What a section says of one part goes over what is said of all, wherever it stands.
+        // What a section states about one part overrides what is stated about all, wherever it stands.
         for section in &sections {
             dcf.take_shared(section, &types)?;
         }

@@ -12,7 +12,7 @@ impl Number {
         Number { constant, factor: 0 }
     }
 
-    /// Its value for node `node`. Wide enough for integers of 64 bits with and without sign.
+    /// The number's value for node `node`. Wide enough for integers of 64 bits with and without sign.
     pub fn of(self, node: u8) -> i128 {
         self.constant + self.factor * i128::from(node)
     }
@@ -45,7 +45,8 @@ impl Number {
         (terms > 0).then_some(sum)
     }
 
-    /// The same as a signed number of `bits` bits where it was written as these bits: 0xFF is −1 in 8 bits.
+    /// This number as a signed number of `bits` bits where it was written as these bits: 0xFF is −1 in 8
+    /// bits.
     fn signed(self, bits: u8) -> Number {
         let half = 1i128 << (bits - 1);
         if !self.depends_on_node() && (half..2 * half).contains(&self.constant) {

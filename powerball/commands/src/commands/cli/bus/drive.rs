@@ -33,7 +33,7 @@ pub(crate) struct Enable {
     place: Where,
     #[command(flatten)]
     consent: Consent,
-    /// Holds the arm for so many seconds.
+    /// Holds the arm for this many seconds.
     #[arg(long, default_value_t = 2.0, value_name = "SECONDS")]
     hold: f64,
 }
@@ -167,8 +167,9 @@ impl Stop {
         }
         #[cfg(unix)]
         if self.watchdog {
-            let told = "powerball: the process that moved the arm has died; all drives were told to stop";
-            let _ = writeln!(std::io::stderr(), "{told}");
+            let message =
+                "powerball: the process that moved the arm has died; all drives were commanded to stop";
+            let _ = writeln!(std::io::stderr(), "{message}");
         }
         let answers = blocking::read_all(&mut *bus, &nodes, STATUSWORD);
         let (mut states, mut stopped, mut failed) = (Vec::new(), Vec::new(), Vec::new());

@@ -35,7 +35,7 @@ enum What {
     Scan(scan::Scan),
     /// Each drive's state, mode, position, velocity, current and errors.
     State(state::Show),
-    /// The same, again and again.
+    /// Each drive's state as `state` shows it, repeatedly.
     Watch(state::Watch),
     /// Read or write an object of a node.
     Sdo(sdo::Sdo),
@@ -64,7 +64,7 @@ impl BusCommand {
     }
 }
 
-/// What every command on a bus is told.
+/// The arguments of every command on a bus.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Where {
     /// The bus: virtual, socketcan:can0, slcan:/dev/ttyACM0 (500 kbit/s; others with ?bitrate=250000 behind it),
@@ -103,7 +103,7 @@ impl Where {
     /// A driver of the arm on an open bus.
     ///
     /// UDP multicast is a bench: nobody promises a program its time slices there, and no arm is hurt by a
-    /// late SYNC. The driver then bears what it would not on a real bus; it counts all the same.
+    /// late SYNC. The driver then tolerates what it would not on a real bus; it still counts it.
     pub(crate) fn driver(
         &self,
         bus: Box<dyn Bus>,
@@ -112,7 +112,7 @@ impl Where {
         self.driver_of(LWA4P, bus, consent)
     }
 
-    /// The same with another profile.
+    /// As [`Self::driver`], with another profile.
     pub(crate) fn driver_of(
         &self,
         mut profile: Profile<6>,

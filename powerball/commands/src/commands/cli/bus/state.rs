@@ -33,7 +33,7 @@ pub(crate) struct Watch {
     /// Seconds between two tables.
     #[arg(long, default_value_t = 0.5, value_name = "SECONDS")]
     every: f64,
-    /// Ends after so many seconds.
+    /// Ends after this many seconds.
     #[arg(long = "for", value_name = "SECONDS")]
     seconds: Option<f64>,
 }

@@ -29,7 +29,7 @@ pub(crate) struct Timing {
     place: Where,
     #[command(flatten)]
     consent: Consent,
-    /// Measures for so many seconds.
+    /// Measures for this many seconds.
     #[arg(long = "for", default_value_t = 10.0, value_name = "SECONDS")]
     seconds: f64,
 }
