@@ -33,10 +33,10 @@ pub struct Rule {
     pub large_gain: f64,
     /// … where either way adds the same: their correlation.
     pub least_correlation: f64,
-    /// The zeros of torque sensors are in the model from the start where so many joints gain
+    /// The zeros of torque sensors are in the model from the start where this many joints gain
     /// [`large_gain`](Self::large_gain) by them, both ways round: one joint alone is an effect like any other.
     pub joints_with_zeros: usize,
-    /// Blocks that count as independent last so many autocorrelation times of what is left …
+    /// Blocks that count as independent last this many autocorrelation times of what is left …
     pub block_memories: f64,
     /// … but not less, s …
     pub shortest_block: f64,
@@ -73,13 +73,13 @@ pub struct Rule {
     pub as_good: f64,
     /// See [`as_good`](Self::as_good): a likelihood ratio of 4.
     pub as_good_score: f64,
-    /// Two names whose gains differ by less than this factor cannot be told apart by these data.
+    /// Two names whose gains differ by less than this factor cannot be distinguished by these data.
     pub least_margin: f64,
     /// Two names of which one explains this share of what the other does are words for the same part of a
     /// residual. Names for the same thing share 98 % and more of it, names for different things less than 70
     /// % (noise-free trials on other data).
     pub same_part: f64,
-    /// A name that is not told apart ([`least_margin`](Self::least_margin)) from the next best one for
+    /// A name that is not distinguished ([`least_margin`](Self::least_margin)) from the next best one for
     /// another part ([`same_part`](Self::same_part)) is not given where it leaves more than this share of the
     /// excess over the noise floor: then something else is there, and what fits best only resembles it. The
     /// share is that of an earlier trial on other data. What is in validation logs only must leave no more of
@@ -109,7 +109,7 @@ pub struct Rule {
     /// A ripple with fewer cycles along the path than this is as good as any other smooth function of the
     /// position.
     pub few_cycles: f64,
-    /// On repeats of one path whatever errs alike in all of them is fitted by whoever has more parameters;
+    /// On repeats of one path an error that is the same in all of them is fitted by whoever has more parameters;
     /// the per-joint fit is taken only where it lowers the held-out squared error by more than this share, 5
     /// % of the rms.
     pub clearly_better: f64,
@@ -154,7 +154,7 @@ pub struct Rule {
     pub decision_level: f64,
     /// Two names whose models differ by less than this share of what either explains say the same.
     pub same_model: f64,
-    /// A difference of so many units of χ² can be seen through the noise: a likelihood ratio of 150.
+    /// A difference of this many units of χ² can be seen through the noise: a likelihood ratio of 150.
     pub visible: f64,
 }
 

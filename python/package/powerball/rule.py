@@ -39,10 +39,10 @@ class Rule:
     large_gain: float = 0.19
     #: … where either way adds the same: their correlation.
     least_correlation: float = 0.5
-    #: The zeros of torque sensors are in the model from the start where so many joints gain ``large_gain``
-    #: by them, both ways round: one joint alone is an effect like any other.
+    #: The zeros of torque sensors are in the model from the start where this many joints gain
+    #: ``large_gain`` by them, both ways round: one joint alone is an effect like any other.
     joints_with_zeros: int = 2
-    #: Blocks that count as independent last so many autocorrelation times of what is left …
+    #: Blocks that count as independent last this many autocorrelation times of what is left …
     block_memories: float = 3.0
     #: … but not less, s …
     shortest_block: float = 0.5
@@ -76,13 +76,13 @@ class Rule:
     as_good: float = 0.02
     #: See ``as_good``: a likelihood ratio of 4.
     as_good_score: float = 3.0
-    #: Two names whose gains differ by less than this factor cannot be told apart by these data.
+    #: Two names whose gains differ by less than this factor cannot be distinguished by these data.
     least_margin: float = 1.1
     #: Two names of which one explains this share of what the other does are words for the same part of a
     #: residual. Names for the same thing share 98 % and more of it, names for different things less than 70
     #: % (noise-free trials on other data).
     same_part: float = 0.9
-    #: A name that is not told apart (``least_margin``) from the next best one for another part
+    #: A name that is not distinguished (``least_margin``) from the next best one for another part
     #: (``same_part``) is not given where it leaves more than this share of the excess over the noise floor:
     #: then something else is there, and what fits best only resembles it. The share is that of an earlier
     #: trial on other data. What is in validation logs only must leave no more of their excess over the
@@ -109,9 +109,9 @@ class Rule:
     #: A ripple with fewer cycles along the path than this is as good as any other smooth function of the
     #: position.
     few_cycles: float = 5.0
-    #: On repeats of one path whatever errs alike in all of them is fitted by whoever has more parameters;
-    #: the per-joint fit is taken only where it lowers the held-out squared error by more than this share, 5
-    #: % of the rms.
+    #: On repeats of one path an error that is the same in all of them is fitted by whoever has more
+    #: parameters; the per-joint fit is taken only where it lowers the held-out squared error by more than
+    #: this share, 5 % of the rms.
     clearly_better: float = 0.1
     #: Two runs start at the same place where every joint does to this share of its travel in all logs.
     same_start: float = 0.05
@@ -150,7 +150,7 @@ class Rule:
     decision_level: float = 0.01
     #: Two names whose models differ by less than this share of what either explains say the same.
     same_model: float = 0.1
-    #: A difference of so many units of χ² can be seen through the noise: a likelihood ratio of 150.
+    #: A difference of this many units of χ² can be seen through the noise: a likelihood ratio of 150.
     visible: float = 10.0
 
 

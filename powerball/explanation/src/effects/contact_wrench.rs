@@ -62,7 +62,7 @@ impl Point {
     }
 }
 
-/// Of so many pushes each is shown; of more the range.
+/// Up to this many pushes, each is shown; of more the range.
 const EACH: usize = 3;
 
 impl Figures {
@@ -107,7 +107,7 @@ const LATE: [f64; 3] = [-0.25, 0.0, 0.25];
 const KNOTS: usize = 5;
 /// What is longer leans on the arm, and does not push it, s.
 pub(crate) const LONGEST_PUSH: f64 = 4.0;
-/// Grid of the same push in other logs, s: its force is known there, so that a row more or less can be told.
+/// Grid of the same push in other logs, s: its force is known there, so that a row more or less makes a difference.
 const FINE: f64 = 0.1;
 
 impl Effect for ContactWrench {
@@ -197,8 +197,8 @@ impl Effect for ContactWrench {
 }
 
 /// A constant force in the window that explains most, and pushes about its middle. Short windows are all tried, longer
-/// ones on a coarse grid, whose ends are then moved. None begins where the arm sets off from rest: what it errs there by is
-/// how it sets off. A push that goes on is found from then on.
+/// ones on a coarse grid, whose ends are then moved. None begins where the arm sets off from rest: an error there is of how
+/// it sets off. A push that goes on is found from then on.
 fn search(context: &Context<'_>) -> Option<Vec<Candidate>> {
     let (data, fit) = (context.data, context.fit);
     let columns = data.force_columns();

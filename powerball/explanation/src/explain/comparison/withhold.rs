@@ -1,4 +1,4 @@
-//! Names that are taken back: they turn out not to be told apart or not to be there.
+//! Names that are taken back: they turn out not to be distinguished from others, or not to be there.
 //!
 //! Also here: whether an effect is there at every pace.
 
@@ -21,13 +21,13 @@ pub(crate) struct Withheld {
 }
 
 /// Takes back what, now that everything that fits is in the model, is not what it is called: an effect
-/// that is missing at some pace; or one that is not told apart from its rivals and beside which much is
-/// left, so that something else is there. It stays as a rival of what comes.
+/// that is missing at some pace; or one that is not distinguished from its rivals and leaves much, so that
+/// something else is there. It stays as a rival of what comes.
 pub(crate) fn withhold(study: &Study<'_>, model: &mut Model, history: &mut History) -> Option<Withheld> {
     let (taken, why) = if let Some(a) = impossible(study, model) {
         (vec![model.accepted.remove(a)], IMPOSSIBLE)
     } else if let Some(a) = inconstant(study, model) {
-        (vec![model.accepted.remove(a)], "what it says of some pace of motion is not there")
+        (vec![model.accepted.remove(a)], "it is not there at every pace of motion")
     } else if let Some(a) = harmful(study, model) {
         (vec![model.accepted.remove(a)], HARMS)
     } else {
@@ -66,7 +66,7 @@ fn take_back(
 ) -> Option<Withheld> {
     let step = taken.first()?.step();
     let effect = taken.first()?.effect();
-    // What was found beside it on its joints may be there because of it, and is asked again.
+    // What was found after it on the same joints may be there because of it, and is tried again.
     let joints: Vec<JointNumber> = taken.iter().flat_map(|a| a.candidate.joints.clone()).collect();
     model.accepted.retain(|a| a.step() <= step || !a.candidate.is_on(&joints));
     model.given_up.extend(taken.into_iter().map(|a| a.candidate));
@@ -111,7 +111,7 @@ fn find_harmful(study: &Study<'_>, model: &Model) -> Option<usize> {
     })
 }
 
-/// Whether a step's name is not told apart from others and leaves much.
+/// Whether a step's name is not distinguished from others and leaves much.
 fn is_weak(study: &Study<'_>, model: &Model, step: &Step) -> bool {
     step.comparison.distinct_margin < study.rule().least_margin
         && model.accepted.iter().any(|a| a.step() == Some(step.number))
