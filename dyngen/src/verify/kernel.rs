@@ -7,6 +7,15 @@ use crate::dynamics::function::{Argument, Size};
 /// More joints or parameters than this no arm has.
 const MOST: usize = 1000;
 
+/// A number of joints, parameters or angles, which a file must say before it is used.
+pub(super) fn size(source: &Source, line: usize, name: &str) -> Checked<usize> {
+    let number = source.constants.get(name).and_then(|(_, entries)| entries.first()?.parse().ok());
+    match number.filter(|n: &usize| *n <= MOST) {
+        Some(number) => Ok(number),
+        None => wrong(line, &format!("{name} must be said before")),
+    }
+}
+
 /// A function that is called for many states.
 pub(super) struct Kernel<'a> {
     /// In the file.
@@ -31,13 +40,8 @@ impl<'a> Kernel<'a> {
         prefix: &'a str,
         function: Function,
     ) -> Checked<Kernel<'a>> {
-        let size = |of: &str| {
-            let number = source.constants.get(of).and_then(|(_, entries)| entries.first()?.parse().ok());
-            number.filter(|n: &usize| *n <= MOST)
-        };
-        let (Some(n), Some(p)) = (size("JOINTS"), size("PARAMETERS")) else {
-            return wrong(line, "the numbers of joints and parameters must be said before");
-        };
+        let [n, p] = ["JOINTS", "PARAMETERS"].map(|name| size(source, line, name));
+        let (n, p) = (n?, p?);
         let is_baked = source.constants.contains_key("PARAMETER_VALUES");
         let taken = function.arguments().iter().filter(|a| !(is_baked && **a == Argument::Parameters));
         let length = |a: &Argument| (*a != Argument::Parameters).then(|| a.length(n, p));

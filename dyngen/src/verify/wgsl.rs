@@ -2,10 +2,11 @@
 
 use super::cursor::{Cursor, Dialect};
 use super::head::Literals;
-use super::kernel::Kernel;
+use super::kernel::{Kernel, size};
 use super::language::{Expr, Kind, Let, Routine};
 use super::{Checked, Source, wrong};
 use crate::dynamics::Function;
+use crate::dynamics::function::Argument;
 use std::collections::BTreeSet;
 
 /// Numbers have a suffix: `0.5f`.
@@ -13,6 +14,9 @@ const DIALECT: Dialect = Dialect { comment: ("//", "\n"), field: ".", number: ("
 
 /// Sines and cosines, tested where they are written.
 const TRIGONOMETRY: &str = include_str!("../emit/wgsl/trigonometry.wgsl");
+
+/// The fields of the struct of sines and cosines, with the constants that are their lengths.
+const TRIG: [(&str, &str); 3] = [("sin", "ANGLES"), ("cos", "ANGLES"), ("position", "JOINTS")];
 
 /// What ends a comment in WGSL and is no end of a line elsewhere: what stands behind it would be code.
 const LINE_BREAKS: [char; 6] = ['\u{b}', '\u{c}', '\r', '\u{85}', '\u{2028}', '\u{2029}'];
@@ -28,6 +32,7 @@ pub(super) fn read(text: &str, literals: &Literals, frames: &[String]) -> Checke
         text: Cursor::new(text, &DIALECT, literals),
         frames,
         prefix: String::new(),
+        values: 0,
         bound: BTreeSet::new(),
         source: Source::default(),
     };
@@ -40,11 +45,18 @@ pub(super) fn read(text: &str, literals: &Literals, frames: &[String]) -> Checke
     Ok(Source { unexplained: reader.text.unexplained, ..reader.source })
 }
 
+/// An argument by its name.
+fn argument(name: &str) -> Option<Argument> {
+    Function::ALL.iter().flat_map(|f| f.arguments()).copied().find(|a| a.name() == name)
+}
+
 struct Reader<'a> {
     text: Cursor<'a>,
     frames: &'a [String],
     /// `name_` of the arm.
     prefix: String,
+    /// How many values are prepared.
+    values: usize,
     /// Taken places of buffers.
     bound: BTreeSet<usize>,
     source: Source,
@@ -126,10 +138,11 @@ impl Reader<'_> {
 
     /// The digits of an array's numbers.
     fn values(&mut self) -> Checked<Vec<String>> {
-        let count = self.array_type()?;
+        let line = self.text.line();
+        self.array_type(size(&self.source, line, "PARAMETERS")?)?;
         self.text.expect("(")?;
         let mut entries = Vec::new();
-        for _ in 0..count {
+        while self.text.peek().is_some_and(|token| token != ")") {
             let sign = if self.text.takes("-") { "-" } else { "" };
             let number = self.text.next();
             entries.push(format!("{sign}{}", number.strip_suffix('f').unwrap_or_default()));
@@ -139,27 +152,33 @@ impl Reader<'_> {
         Ok(entries)
     }
 
-    /// The length in `array<f32, 6>`.
-    fn array_type(&mut self) -> Checked<usize> {
-        self.text.expect("array < f32 ,")?;
-        let line = self.text.line();
-        let Ok(length) = self.text.next().parse() else { return wrong(line, "a length is expected here") };
-        self.text.expect(">")?;
-        Ok(length)
+    /// `array<f32, 6>`
+    fn array_type(&mut self, length: usize) -> Checked<()> {
+        self.text.expect(&format!("array < f32 , {length} >"))
     }
 
     /// One of the two structs.
     fn record(&mut self, line: usize) -> Checked<()> {
-        let fields: &[&str] = match self.own_name()?.as_str() {
-            "trig" => &["sin", "cos", "position"],
-            "prepared" => &["values"],
-            _ => return wrong(line, "a struct that dyngen does not write"),
-        };
+        let name = self.own_name()?;
         self.text.expect("{")?;
-        for field in fields {
-            self.text.expect(&format!("{field} :"))?;
-            self.array_type()?;
-            self.text.expect(",")?;
+        match name.as_str() {
+            "trig" => {
+                for (field, length) in TRIG {
+                    self.text.expect(&format!("{field} :"))?;
+                    self.array_type(size(&self.source, line, length)?)?;
+                    self.text.expect(",")?;
+                }
+            }
+            "prepared" => {
+                self.text.expect("values : array < f32 ,")?;
+                let line = self.text.line();
+                let Ok(length) = self.text.next().parse() else {
+                    return wrong(line, "a length is expected here");
+                };
+                self.values = length;
+                self.text.expect("> ,")?;
+            }
+            _ => return wrong(line, "a struct that dyngen does not write"),
         }
         self.text.expect("}")
     }
@@ -175,16 +194,15 @@ impl Reader<'_> {
         let access = self.text.until(">").join(" ");
         self.text.expect(">")?;
         let name = self.own_name()?;
-        let known = |name: &str| Function::ALL.iter().flat_map(|f| f.arguments()).any(|a| a.name() == name);
         match (access.as_str(), name.as_str()) {
             ("uniform", "count") if place == 0 => self.text.expect(": u32 ;"),
             ("storage , read_write", "result") => self.text.expect(": array < f32 > ;"),
             ("storage , read", "parameters") => {
                 self.text.expect(":")?;
-                self.array_type()?;
+                self.array_type(size(&self.source, line, "PARAMETERS")?)?;
                 self.text.expect(";")
             }
-            ("storage , read", name) if known(name) => self.text.expect(": array < f32 > ;"),
+            ("storage , read", name) if argument(name).is_some() => self.text.expect(": array < f32 > ;"),
             _ => wrong(line, "a variable that dyngen does not write"),
         }
     }
@@ -196,7 +214,7 @@ impl Reader<'_> {
         };
         let parameters = self.parameters()?;
         self.text.expect("->")?;
-        self.result_type()?;
+        let shape = self.result_type(&name)?;
         self.text.place = name.clone();
         self.text.expect("{")?;
         let mut lets = Vec::new();
@@ -205,7 +223,7 @@ impl Reader<'_> {
         }
         let end = self.text.line();
         self.text.expect("return")?;
-        let result = self.result(end, &name)?;
+        let result = self.result(end, &name, shape)?;
         self.text.expect("; }")?;
         let body = Expr { line: end, kind: Kind::Block(lets, Box::new(result)) };
         match self.source.routines.insert(name, Routine { line, parameters, body }) {
@@ -219,11 +237,16 @@ impl Reader<'_> {
         let mut read = Vec::new();
         self.text.expect("(")?;
         loop {
+            let line = self.text.line();
             let name = self.text.next();
             self.text.expect(":")?;
-            match name.as_str() {
-                "trig" | "prepared" => self.text.expect(&format!("{}{name}", self.prefix))?,
-                _ => self.array_type().map(|_| ())?,
+            match (name.as_str(), argument(&name)) {
+                ("trig" | "prepared", _) => self.text.expect(&format!("{}{name}", self.prefix))?,
+                (_, Some(argument)) => {
+                    let [n, p] = ["JOINTS", "PARAMETERS"].map(|of| size(&self.source, line, of));
+                    self.array_type(argument.length(n?, p?))?;
+                }
+                _ => return wrong(line, "a parameter that dyngen does not write"),
             }
             read.push(name);
             if !self.text.takes(",") {
@@ -234,13 +257,20 @@ impl Reader<'_> {
         Ok(read)
     }
 
-    /// A type that a wrong result does not have, as a compiler says.
-    fn result_type(&mut self) -> Checked<()> {
-        let own = ["trig", "prepared"].map(|name| format!("{}{name}", self.prefix));
-        if self.text.takes("f32") || own.iter().any(|name| self.text.takes(name)) {
-            return Ok(());
+    /// The type of a function's result; gives its rows and columns, none where it is a struct.
+    fn result_type(&mut self, name: &str) -> Checked<Option<(usize, usize)>> {
+        let line = self.text.line();
+        let of = name.rsplit("::").next().unwrap_or(name);
+        let Some(function) = Function::parse(of.strip_suffix("_with").unwrap_or(of)) else {
+            let name = if name == "prepare" { "prepared" } else { "trig" };
+            return self.text.expect(&format!("{}{name}", self.prefix)).map(|()| None);
+        };
+        if matches!(function, Function::KineticEnergy | Function::PotentialEnergy) {
+            return self.text.expect("f32").map(|()| Some((1, 1)));
         }
-        self.array_type().map(|_| ())
+        let [n, p] = ["JOINTS", "PARAMETERS"].map(|of| size(&self.source, line, of));
+        let (rows, columns) = function.shape(n?, p?);
+        self.array_type(rows * columns).map(|()| Some((rows, columns)))
     }
 
     /// What stands behind `let`.
@@ -257,39 +287,42 @@ impl Reader<'_> {
         })
     }
 
-    /// What a function returns.
-    fn result(&mut self, line: usize, name: &str) -> Checked<Expr> {
-        let of = name.rsplit("::").next().unwrap_or(name);
-        match (of, of.strip_suffix("_with")) {
-            ("new", _) => {
+    /// What a function returns, of `shape` where it is no struct.
+    fn result(&mut self, line: usize, name: &str, shape: Option<(usize, usize)>) -> Checked<Expr> {
+        match shape {
+            Some(_) if !name.ends_with("_with") => self.call(line, name),
+            Some((rows, columns)) if self.text.peek() == Some("array") => {
+                let mut lists = vec![Vec::new(); columns];
+                for (k, entry) in self.entries(rows * columns)?.into_iter().enumerate() {
+                    lists[k % columns].push(entry);
+                }
+                let list = |entries: Vec<Expr>| Expr { line, kind: Kind::List(entries) };
+                Ok(list(lists.into_iter().map(list).collect()))
+            }
+            Some(_) => self.text.sum(),
+            None if name == "prepare" => {
+                self.text.expect(&format!("{}prepared (", self.prefix))?;
+                let list = Expr { line, kind: Kind::List(self.entries(self.values)?) };
+                self.text.expect(")")?;
+                Ok(Expr { line, kind: Kind::AsPrepared(Box::new(list)) })
+            }
+            None => {
                 self.text.expect(&format!("{}trig (", self.prefix))?;
                 let mut fields = Vec::new();
-                for field in ["sin", "cos", "position"] {
-                    let entries = self.entries()?;
+                for (field, length) in TRIG {
+                    let entries = self.entries(size(&self.source, line, length)?)?;
                     self.text.expect(",")?;
                     fields.push((field.to_string(), Expr { line, kind: Kind::List(entries) }));
                 }
                 self.text.expect(")")?;
                 Ok(Expr { line, kind: Kind::Record(fields) })
             }
-            ("prepare", _) => {
-                self.text.expect(&format!("{}prepared (", self.prefix))?;
-                let list = Expr { line, kind: Kind::List(self.entries()?) };
-                self.text.expect(")")?;
-                Ok(Expr { line, kind: Kind::AsPrepared(Box::new(list)) })
-            }
-            (_, None) => self.call(line, name),
-            (_, Some(_)) if self.text.peek() == Some("array") => {
-                let entries = self.entries()?;
-                self.matrix(line, of, entries)
-            }
-            _ => self.text.sum(),
         }
     }
 
     /// `array<f32, 2>(x1, -x2,)`
-    fn entries(&mut self) -> Checked<Vec<Expr>> {
-        let count = self.array_type()?;
+    fn entries(&mut self, count: usize) -> Checked<Vec<Expr>> {
+        self.array_type(count)?;
         self.text.expect("(")?;
         let mut entries = Vec::new();
         for _ in 0..count {
@@ -298,25 +331,6 @@ impl Reader<'_> {
         }
         self.text.expect(")")?;
         Ok(entries)
-    }
-
-    /// Entries that stand row by row as a list of columns.
-    fn matrix(&self, line: usize, of: &str, entries: Vec<Expr>) -> Checked<Expr> {
-        let size = |name: &str| {
-            let constant = self.source.constants.get(name);
-            constant.and_then(|(_, entries)| entries.first()?.parse().ok()).unwrap_or(0)
-        };
-        let function = Function::parse(of.trim_end_matches("_with"));
-        let columns = function.map_or(0, |f| f.shape(size("JOINTS"), size("PARAMETERS")).1);
-        if columns == 0 || columns > entries.len() {
-            return wrong(line, "a result of another shape");
-        }
-        let mut lists = vec![Vec::new(); columns];
-        for (k, entry) in entries.into_iter().enumerate() {
-            lists[k % columns].push(entry);
-        }
-        let list = |entries: Vec<Expr>| Expr { line, kind: Kind::List(entries) };
-        Ok(list(lists.into_iter().map(list).collect()))
     }
 
     /// `NAME_gravity_with(NAME_trig_of(q), NAME_prepare(parameters))`

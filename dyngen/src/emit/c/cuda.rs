@@ -29,13 +29,10 @@ typedef {}_real real;
         names.upper,
         names.numbers(),
         names.prefix,
-        helpers(&names, model, options).replace("\nstatic ", &format!("\n{DEVICE}")),
+        helpers(&names, model, options).replace("\nstatic ", "\nstatic __device__ "),
         items.join("\n")
     ))
 }
-
-/// Before what threads call or read.
-const DEVICE: &str = "static __device__ ";
 
 /// What compilers must bring. NVRTC has no headers.
 const BEFORE: &str = r#"#ifdef __CUDACC_RTC__
@@ -71,15 +68,14 @@ fn head(names: &Names, model: &Model, options: &Options, rounded: &[String]) -> 
     comment("/*", lines.iter().chain([&sizes]).chain(rounded)) + "\n"
 }
 
-/// An item in a file without a header.
+/// An item in a file without a header; inline, because not all of them are called or read.
 fn text(item: &Item) -> String {
-    let qualifiers = if matches!(item, Item::Function { .. }) { DEVICE } else { "" };
-    match (item, item.definition()) {
-        (Item::Constants { doc, .. } | Item::Function { doc, .. }, Some(definition)) => {
-            format!("{}{qualifiers}{definition}", documentation(doc))
-        }
-        _ => item.declaration(),
-    }
+    let (doc, qualifier) = match item {
+        Item::Declared(text) => return text.clone(),
+        Item::Constants { doc, .. } => (doc, "inline"),
+        Item::Function { doc, .. } => (doc, "inline __device__"),
+    };
+    format!("{}{qualifier} {}", documentation(doc), item.definition().unwrap_or_default())
 }
 
 /// The kernel of a function.

@@ -33,9 +33,6 @@ typedef double name_real;
 typedef name_real real;
 ";
 
-/// Before a function of a GPU's threads.
-const DEVICE: &str = "static __device__ ";
-
 impl Reader<'_> {
     pub(super) fn before_cuda(&mut self) -> Checked<()> {
         self.text.text(BEFORE, OTHER)?;
@@ -47,7 +44,7 @@ impl Reader<'_> {
         self.text.text(&NUMBERS.replace("NAME", &upper).replace("name", &lower), OTHER)?;
         // An arm whose joints all slide has no sines.
         if self.text.peek().is_some_and(|token| token == format!("#ifdef {upper}_FLOAT")) {
-            let device = TRIGONOMETRY.replace("\nstatic ", &format!("\n{DEVICE}"));
+            let device = TRIGONOMETRY.replace("\nstatic ", "\nstatic __device__ ");
             self.text.text(&device.replace("NAME", &upper), OTHER)?;
         }
         Ok(())
@@ -63,11 +60,13 @@ impl Reader<'_> {
             ("extern \"C\" __global__ void", _) => self.kernel(line, name).map(|()| None),
             ("typedef", "struct") => self.record(line).map(|()| None),
             ("static __device__ real", _) => Ok(Some("static real".to_string())),
-            (kind, _) if kind.starts_with("const ") => Ok(Some(kind.to_string())),
-            (kind, _) => match kind.strip_prefix(DEVICE) {
-                Some(kind) => Ok(Some(kind.to_string())),
-                None => wrong(line, "an item that dyngen does not write"),
-            },
+            (kind, _) => {
+                let constant = kind.strip_prefix("inline ").filter(|kind| kind.starts_with("const "));
+                match constant.or(kind.strip_prefix("inline __device__ ")) {
+                    Some(kind) => Ok(Some(kind.to_string())),
+                    None => wrong(line, "an item that dyngen does not write"),
+                }
+            }
         }
     }
 
@@ -105,9 +104,10 @@ impl Reader<'_> {
         if fields == wanted(&[("sin", &angles), ("cos", &angles), ("position", &joints)]) {
             return self.text.expect(&format!("}} {prefix}trig ;"));
         }
-        let length = fields.split(' ').nth(3).filter(|length| length.bytes().all(|c| c.is_ascii_digit()));
+        let length = fields.split(' ').nth(3).and_then(|length| length.parse::<usize>().ok());
         match length {
-            Some(length) if fields == wanted(&[("values", length)]) => {
+            Some(length) if fields == wanted(&[("values", &length.to_string())]) => {
+                self.values = Some(length);
                 self.text.expect(&format!("}} {prefix}prepared ;"))
             }
             _ => wrong(line, "a struct that dyngen does not write"),

@@ -45,6 +45,7 @@ pub(super) fn read(text: &str, is_cuda: bool, literals: &Literals, frames: &[Str
         is_cuda,
         frames,
         prefix: String::new(),
+        values: None,
         source: Source::default(),
     };
     if is_cuda {
@@ -65,6 +66,8 @@ struct Reader<'a> {
     frames: &'a [String],
     /// `name_` of the arm.
     prefix: String,
+    /// How many values are prepared, in CUDA; in C the header says it.
+    values: Option<usize>,
     source: Source,
 }
 
@@ -180,8 +183,7 @@ impl Reader<'_> {
             (_, Some(call)) => call,
             ("Trig::new", None) => body.trig(end),
             ("prepare", None) => {
-                let values = body.results.into_iter().map(|(_, value)| value).collect();
-                let list = Expr { line: end, kind: Kind::List(values) };
+                let list = Expr { line: end, kind: Kind::List(self.prepared(end, body.results)?) };
                 Expr { line: end, kind: Kind::AsPrepared(Box::new(list)) }
             }
             (name, None) => matrix(name, end, body.results)?,
@@ -191,6 +193,18 @@ impl Reader<'_> {
             None => Ok(()),
             Some(_) => wrong(line, "a second function of this name"),
         }
+    }
+
+    /// What is prepared; every value must be written once, in order, and as many as the struct has where it is known.
+    fn prepared(&self, end: usize, results: Vec<(Vec<usize>, Expr)>) -> Checked<Vec<Expr>> {
+        if self.values.is_some_and(|count| count != results.len()) {
+            return wrong(end, "other values than the struct has");
+        }
+        let value = |(k, (at, value)): (usize, (Vec<usize>, Expr))| match at == [k] {
+            true => Ok(value),
+            false => wrong(value.line, "a prepared value that is not the next one"),
+        };
+        results.into_iter().enumerate().map(value).collect()
     }
 
     /// The names of what a function reads.
