@@ -262,6 +262,31 @@ fn no_changed_file_passes() {
     }
 }
 
+/// Cut anywhere, or with a letter of two bytes or a bracket anywhere.
+#[test]
+fn broken_files_end_with_an_error_or_a_difference_and_no_panic() {
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let arm = file("crane_broken.toml", CRANE);
+    let config = Config::new(&arm).functions([Function::Gravity, Function::KineticEnergy]);
+    for language in LANGUAGES {
+        let (text, verifier) = generated(&config, &arm, language);
+        let mut refused = 0;
+        for _ in 0..300 {
+            let mut at = rng.random_range(0..text.len());
+            while !text.is_char_boundary(at) {
+                at -= 1;
+            }
+            let put = ["é", "(", "{", "}", "\"", "#", "/*"][rng.random_range(0..7)];
+            let whole = format!("{}{put}{}", &text[..at], &text[at..]);
+            let broken = if rng.random_range(0..2) == 0 { &text[..at] } else { &whole };
+            let found = verifier.verify(broken, None);
+            refused += usize::from(found.is_err() || found.unwrap().difference.is_some());
+        }
+        // The rest is in comments, or ends behind an item.
+        assert!(refused > 150, "{language}: {refused}");
+    }
+}
+
 #[test]
 fn what_surrounds_the_functions_must_be_what_dyngen_writes() {
     let arm = root().join("tests/arms/twist.toml");
