@@ -35,7 +35,8 @@ pub enum Language {
     Rust,
     /// C99, `double` or `float`: a source file and its header.
     C,
-    /// CUDA, `double` or `float`: the functions in C for a GPU's threads, each with a kernel over many states.
+    /// CUDA, `double` or `float`: the functions in C for a GPU's threads, each with a kernel over many
+    /// states.
     Cuda,
     /// WGSL, the language of WebGPU, `f32`: functions, each with an entry point over many states.
     Wgsl,

@@ -1,5 +1,5 @@
-//! Generated CUDA and WGSL: what is written, what `dyngen verify` proves of it, and that no change of it passes. What
-//! compilers and devices make of the text is tested by `.ci/gpu`.
+//! Generated CUDA and WGSL: what is written, what `dyngen verify` proves of it, and that no change of it
+//! passes. What compilers and devices make of the text is tested by `.ci/gpu`.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing)]
 
@@ -9,7 +9,8 @@ use dyngen::{Arm, Config, Function, Language};
 use rand::{RngExt, SeedableRng};
 use std::path::{Path, PathBuf};
 
-/// Joints that slide and follow others, names, an angle in radians, and a frame whose name begins as a function's.
+/// Joints that slide and follow others, names, an angle in radians, and a frame whose name begins as a
+/// function's.
 const CRANE: &str = r#"
 name = "Crane 5"
 convention = "standard"

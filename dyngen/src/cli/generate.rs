@@ -15,8 +15,8 @@ pub(super) struct Args {
     /// The file to write; in C its header FILE.h is written next to it.
     #[arg(short, long, value_name = "FILE.rs|FILE.c|FILE.cu|FILE.wgsl")]
     output: PathBuf,
-    /// The language: c is C99, double, or float with -DNAME_FLOAT; cuda the same with a kernel for each function, wgsl
-    /// with an entry point for each, f32 alone.
+    /// The language: c is C99, double, or float with -DNAME_FLOAT; cuda the same with a kernel for each
+    /// function, wgsl with an entry point for each, f32 alone.
     #[arg(long, value_enum, default_value = "rust")]
     language: In,
     /// The parameter set of every function.

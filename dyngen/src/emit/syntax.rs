@@ -61,8 +61,8 @@ impl Syntax {
             .collect()
     }
 
-    /// The lines that name what a function reads of another argument, of which `prepared` values are made of the
-    /// parameters.
+    /// The lines that name what a function reads of another argument, of which `prepared` values are made of
+    /// the parameters.
     pub(super) fn of_argument(
         &self,
         built: &FunctionGraph,

@@ -35,7 +35,8 @@ struct Source {
     unexplained: Vec<(usize, String)>,
 }
 
-/// What a function whose name in C stands behind the arm's is called in the language; `frames` are those of the arm.
+/// What a function whose name in C stands behind the arm's is called in the language; `frames` are those of
+/// the arm.
 fn routine(name: &str, frames: &[String]) -> Option<String> {
     let is_known = |name: &str| Function::parse(name.strip_suffix("_with").unwrap_or(name)).is_some();
     match name {

@@ -106,7 +106,8 @@ impl Reader<'_> {
         }
     }
 
-    /// `const NAME_JOINTS: u32 = 6u;`, of which the first says how names begin, or the values that are baked in.
+    /// `const NAME_JOINTS: u32 = 6u;`, of which the first says how names begin, or the values that are baked
+    /// in.
     fn constant(&mut self, line: usize) -> Checked<()> {
         let name = self.text.next();
         let upper = name.strip_suffix("_JOINTS").filter(|_| self.prefix.is_empty());

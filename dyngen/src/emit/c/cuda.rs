@@ -1,5 +1,5 @@
-//! The functions in C once more as functions of a GPU's threads in CUDA, each with a kernel that calls it for many
-//! states.
+//! The functions in C once more as functions of a GPU's threads in CUDA, each with a kernel that calls it for
+//! many states.
 
 use super::{Item, Names, comment, documentation, helpers, items};
 use crate::dynamics::FunctionGraph;

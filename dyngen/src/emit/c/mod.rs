@@ -1,5 +1,5 @@
-//! The same functions as C99, a source file and its header, from the statements that the file in Rust is printed from;
-//! and with kernels around them as CUDA.
+//! The same functions as C99, a source file and its header, from the statements that the file in Rust is
+//! printed from; and with kernels around them as CUDA.
 
 mod cuda;
 mod friction;

@@ -1,5 +1,5 @@
-//! The same functions in WGSL, the language of WebGPU, from the statements that the file in Rust is printed from; and
-//! entry points that call them for many states.
+//! The same functions in WGSL, the language of WebGPU, from the statements that the file in Rust is printed
+//! from; and entry points that call them for many states.
 
 mod entry;
 

@@ -1,5 +1,6 @@
-// Sines and cosines by additions and multiplications alone, up to 800 rad: within 1 ulp where sums are rounded as they
-// are written. Line by line what the file in C does with floats; beyond, what the language has.
+// Sines and cosines by additions and multiplications alone, up to 800 rad: within 1 ulp where sums are
+// rounded as they are written. Line by line what the file in C does with floats; beyond, what the language
+// has.
 
 // sin r = r + r^3 * (...), cos r = 1 - r^2/2 + r^4 * (...) for |r| <= pi/4, interpolated at Chebyshev points.
 fn sine_series(z: f32) -> f32 {
@@ -18,8 +19,9 @@ fn sin_cos(angle: f32) -> vec2<f32> {
     if (abs(angle) > 800.0f) {
         return vec2<f32>(sin(angle), cos(angle));
     }
-    // Quarter turns, and what is left of the angle in two parts: products with the first two parts of pi/2 are exact
-    // (Cody and Waite). Rounded by name: a compiler may leave out what is added and taken away again.
+    // Quarter turns, and what is left of the angle in two parts: products with the first two parts of pi/2
+    // are exact (Cody and Waite). Rounded by name: a compiler may leave out what is added and taken away
+    // again.
     let quarters = round(angle * 0.63661977236758134308f);
     let near_zero = angle - (quarters * 1.57080078125f);
     let part = quarters * -4.4545158743858337402e-6f;

@@ -50,7 +50,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// The words before the name of an item as they are in C; none where it is one that C has not, which is read.
+    /// The words before the name of an item as they are in C; none where it is one that C has not, which is
+    /// read.
     pub(super) fn of_cuda(&mut self, line: usize, kind: &str, name: &str) -> Checked<Option<String>> {
         if self.text.peek().is_some_and(|token| token.starts_with('#')) && kind.is_empty() && name.is_empty()
         {

@@ -195,7 +195,8 @@ impl Reader<'_> {
         }
     }
 
-    /// What is prepared; every value must be written once, in order, and as many as the struct has where it is known.
+    /// What is prepared; every value must be written once, in order, and as many as the struct has where it
+    /// is known.
     fn prepared(&self, end: usize, results: Vec<(Vec<usize>, Expr)>) -> Checked<Vec<Expr>> {
         if self.values.is_some_and(|count| count != results.len()) {
             return wrong(end, "other values than the struct has");
