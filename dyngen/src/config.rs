@@ -35,6 +35,42 @@ pub enum Language {
     Rust,
     /// C99, `double` or `float`: a source file and its header.
     C,
+    /// CUDA, `double` or `float`: the functions in C for a GPU's threads, each with a kernel over many
+    /// states.
+    Cuda,
+    /// WGSL, the language of WebGPU, `f32`: functions, each with an entry point over many states.
+    Wgsl,
+}
+
+impl Language {
+    /// What the names of its files end in.
+    #[must_use]
+    pub fn extension(self) -> &'static str {
+        match self {
+            Language::Rust => "rs",
+            Language::C => "c",
+            Language::Cuda => "cu",
+            Language::Wgsl => "wgsl",
+        }
+    }
+
+    /// The language of a file, by its name; Rust where that ends in something else.
+    #[must_use]
+    pub fn of(file: &Path) -> Language {
+        let named = |language: &Language| file.extension().is_some_and(|e| e == language.extension());
+        [Language::C, Language::Cuda, Language::Wgsl].into_iter().find(named).unwrap_or_default()
+    }
+}
+
+impl fmt::Display for Language {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Language::Rust => "Rust",
+            Language::C => "C",
+            Language::Cuda => "CUDA",
+            Language::Wgsl => "WGSL",
+        })
+    }
 }
 
 /// Why nothing was generated.
@@ -133,7 +169,7 @@ impl Config {
     /// # Errors
     /// Everything that is wrong with the arm file, or what could not be proven.
     pub fn source(&self) -> Result<String, GenerateError> {
-        let texts = self.texts(&self.arm.with_extension("c"))?;
+        let texts = self.texts(&self.arm.with_extension(self.language.extension()))?;
         Ok(texts.into_iter().next().map(|(_, text)| text).unwrap_or_default())
     }
 
@@ -144,10 +180,16 @@ impl Config {
     pub fn texts(&self, file: &Path) -> Result<Vec<(PathBuf, String)>, GenerateError> {
         let files = self.files(file)?;
         let (model, options) = self.model()?;
-        let texts = match files.get(1).and_then(|header| header.file_name()) {
-            None => emit::source(&model, &options).map(|source| vec![source]),
-            Some(header) => emit::c_files(&model, &options, &header.to_string_lossy())
-                .map(|CFiles { header, source }| vec![source, header]),
+        let texts = match self.language {
+            Language::Rust => emit::source(&model, &options).map(|source| vec![source]),
+            Language::C => {
+                let header = file.with_extension("h");
+                let header = header.file_name().unwrap_or_default().to_string_lossy();
+                let files = emit::c_files(&model, &options, &header);
+                files.map(|CFiles { header, source }| vec![source, header])
+            }
+            Language::Cuda => emit::cuda_source(&model, &options).map(|source| vec![source]),
+            Language::Wgsl => emit::wgsl_source(&model, &options).map(|source| vec![source]),
         };
         Ok(files.into_iter().zip(texts.map_err(GenerateError::Model)?).collect())
     }
@@ -186,20 +228,31 @@ impl Config {
     /// # Errors
     /// What the language does not have.
     pub fn files(&self, file: &Path) -> Result<Vec<PathBuf>, GenerateError> {
-        if self.language == Language::Rust {
-            return Ok(vec![file.to_path_buf()]);
+        let language = self.language;
+        let only_in = |others: &str, what: &str| {
+            let message = format!("{what}: only in {others}; leave it out for {language}");
+            Err(GenerateError::Language(message))
+        };
+        let has_header = language == Language::C;
+        match language {
+            Language::Rust => return Ok(vec![file.to_path_buf()]),
+            _ if self.options.batch => return only_in("Rust", "batch (functions over blocks of samples)"),
+            _ if self.options.tests => return only_in("Rust", "tests (the arm's own consistency tests)"),
+            Language::Wgsl if !self.options.friction.is_empty() => {
+                return only_in("Rust, C and CUDA", "friction (columns of the joints' friction)");
+            }
+            _ if Language::of(file) == language => {}
+            _ => {
+                let header = if has_header { ", and its header, written next to it, in .h" } else { "" };
+                return Err(GenerateError::Language(format!(
+                    "{}: a file in {language} ends in .{}{header}",
+                    file.display(),
+                    language.extension()
+                )));
+            }
         }
-        let only_rust =
-            |what: &str| Err(GenerateError::Language(format!("{what}: only in Rust; leave it out for C")));
-        match file.extension() {
-            _ if self.options.batch => only_rust("batch (functions over blocks of samples)"),
-            _ if self.options.tests => only_rust("tests (the arm's own consistency tests)"),
-            Some(extension) if extension == "c" => Ok(vec![file.to_path_buf(), file.with_extension("h")]),
-            _ => Err(GenerateError::Language(format!(
-                "{}: a file in C ends in .c, and its header, written next to it, in .h",
-                file.display()
-            ))),
-        }
+        let header = has_header.then(|| file.with_extension("h"));
+        Ok(std::iter::once(file.to_path_buf()).chain(header).collect())
     }
 
     /// Writes the generated file, in C with its header; a file that is there already is replaced as a whole or not at

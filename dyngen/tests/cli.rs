@@ -169,6 +169,37 @@ fn generate_in_c_writes_a_header_too_and_says_what_c_does_not_have() {
 }
 
 #[test]
+fn generate_for_a_gpu_writes_one_file_and_says_what_it_does_not_have() {
+    for (language, end, name) in [("cuda", "cu", "CUDA"), ("wgsl", "wgsl", "WGSL")] {
+        let source = file(&format!("gpu.{end}"), "");
+        let generate = |more: &[&str]| {
+            let given = ["generate", &arm(), "--language", language, "--functions", "gravity"];
+            dyngen(&[&given[..], more].concat())
+        };
+        assert!(generate(&["-o", &source]).status.success());
+        assert!(std::fs::read_to_string(&source).unwrap().contains("powerball_lwa4p_gravity_batch("));
+        assert!(generate(&["-o", &source, "--check"]).status.success());
+        let verified = dyngen(&["verify", &source, &arm()]);
+        assert!(text(&verified.stdout).contains("proven: gravity_batch\n"), "{}", text(&verified.stderr));
+        let friction = generate(&["-o", &source, "--check", "--friction", "viscous"]);
+        let said = text(&friction.stderr);
+        assert!(
+            said.contains(if name == "CUDA" { "is stale" } else { "only in Rust, C and CUDA" }),
+            "{said}"
+        );
+        for (more, words) in [
+            (&["-o", &source, "--batch"][..], format!("only in Rust; leave it out for {name}")),
+            (&["-o", &source, "--tests"], format!("only in Rust; leave it out for {name}")),
+            (&["-o", "arm.c"], format!("arm.c: a file in {name} ends in .{end}\n")),
+        ] {
+            let refused = generate(more);
+            assert_eq!(refused.status.code(), Some(2), "{more:?}");
+            assert!(text(&refused.stderr).contains(&words), "{}", text(&refused.stderr));
+        }
+    }
+}
+
+#[test]
 fn eval_gives_the_torque_of_the_regressor_and_takes_values_by_either_name() {
     let states = file(
         "states.csv",

@@ -7,14 +7,16 @@ use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example: dyngen generate arm.toml -o arm.rs --parameters minimal --functions \
-        regressor,mass_matrix\n         dyngen generate arm.toml --language c -o arm.c")]
+        regressor,mass_matrix\n         dyngen generate arm.toml --language c -o arm.c\n         dyngen generate \
+        arm.toml --language cuda -o arm.cu")]
 pub(super) struct Args {
     /// The arm file.
     arm: PathBuf,
     /// The file to write; in C its header FILE.h is written next to it.
-    #[arg(short, long, value_name = "FILE.rs|FILE.c")]
+    #[arg(short, long, value_name = "FILE.rs|FILE.c|FILE.cu|FILE.wgsl")]
     output: PathBuf,
-    /// The language: c is C99, double, or float with -DNAME_FLOAT.
+    /// The language: c is C99, double, or float with -DNAME_FLOAT; cuda the same with a kernel for each
+    /// function, wgsl with an entry point for each, f32 alone.
     #[arg(long, value_enum, default_value = "rust")]
     language: In,
     /// The parameter set of every function.
@@ -49,6 +51,8 @@ pub(super) struct Args {
 enum In {
     Rust,
     C,
+    Cuda,
+    Wgsl,
 }
 
 /// A function by its name.
@@ -63,6 +67,8 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         .language(match args.language {
             In::Rust => Language::Rust,
             In::C => Language::C,
+            In::Cuda => Language::Cuda,
+            In::Wgsl => Language::Wgsl,
         })
         .friction(args.friction.clone())
         .batch(args.batch)

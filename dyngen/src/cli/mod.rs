@@ -36,7 +36,7 @@ struct Cli {
 enum Command {
     /// Kinematics, parameters with their class, the sets with their relations, operation counts.
     Describe(describe::Args),
-    /// Writes the arm's functions as one Rust source file.
+    /// Writes the arm's functions as source code: Rust, C, CUDA or WGSL.
     Generate(generate::Args),
     /// Makes an arm file, with inertial values next to it, from a serial chain of a URDF.
     Import(import::Args),

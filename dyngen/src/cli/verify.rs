@@ -10,7 +10,7 @@ use std::process::ExitCode;
 #[derive(clap::Args)]
 #[command(after_help = "Example: dyngen generate arm.toml -o arm.rs && dyngen verify arm.rs arm.toml")]
 pub(super) struct Args {
-    /// The generated file; in C where its name ends in .c.
+    /// The generated file; in C, CUDA or WGSL where its name ends in .c, .cu or .wgsl.
     file: PathBuf,
     /// The arm file that it was generated from.
     arm: PathBuf,
@@ -34,11 +34,7 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let arm = arm(&args.arm)?;
     let progress = Progress::new(&arm);
     progress.say("deriving, reading and proving");
-    let language = match args.file.extension().is_some_and(|e| e == "c") {
-        true => Language::C,
-        false => Language::Rust,
-    };
-    let verifier = Verifier::new(arm, language, &text).map_err(failure)?;
+    let verifier = Verifier::new(arm, Language::of(&args.file), &text).map_err(failure)?;
     if let Some(path) = &args.values {
         check_values(&verifier, path)?;
     }

@@ -116,11 +116,10 @@ impl Positions {
     fn new(model: &Model, used: &BTreeSet<Input>, position: impl Fn(usize) -> TokenStream) -> Positions {
         let arm = model.arm();
         let zero = quote!(T::zero());
-        let revolute = |i: usize| arm.joints[i].kind == JointKind::Revolute;
         let places: Vec<bool> = (0..arm.dof()).map(|i| used.contains(&Input::Position(i))).collect();
         let (mut found, mut sines, mut cosines) = (Vec::new(), Vec::new(), Vec::new());
         for sum in model.angles().taken().iter().copied() {
-            let turns = sum.joints().all(|(i, _)| revolute(i));
+            let turns = turns(model, sum);
             let name = |input: Input| {
                 (turns && used.contains(&input)).then(|| format_ident!("{}", input.to_string()))
             };
@@ -138,6 +137,11 @@ impl Positions {
         let trig = quote!(Trig { sin: [#(#sines),*], cos: [#(#cosines),*], position: [#(#values),*] });
         Positions { places, angles: found, trig }
     }
+}
+
+/// Whether the angle is one: of joints that turn.
+pub(super) fn turns(model: &Model, sum: JointSum) -> bool {
+    sum.joints().all(|(joint, _)| model.arm().joints[joint].kind == JointKind::Revolute)
 }
 
 /// A term of an angle: ± ratio·q of a coordinate.

@@ -1,4 +1,4 @@
-//! From graphs to source files: statements, docs, and their print in Rust and in C.
+//! From graphs to source files: statements, docs, and their print in Rust, C, CUDA and WGSL.
 
 #[cfg(test)]
 mod accuracy;
@@ -11,15 +11,19 @@ pub(crate) mod discrete;
 mod docs;
 mod friction;
 mod lanes;
+mod names;
 mod rounded;
 mod signs;
 mod statement;
+mod syntax;
 mod tests;
 #[cfg(test)]
 mod trigonometry;
+mod wgsl;
 
-pub use c::{CFiles, c_files};
+pub use c::{CFiles, c_files, cuda_source};
 pub use friction::FrictionTerm;
+pub use wgsl::wgsl_source;
 
 use crate::arm::{Arm, Frame};
 use crate::dynamics::function::Argument;
@@ -116,12 +120,18 @@ impl<'a> Parts<'a> {
         Ok(Parts { set, functions, frames, preparation })
     }
 
-    fn all(&self) -> impl Iterator<Item = &FunctionGraph> {
-        self.functions.iter().chain(self.frames.iter().flat_map(|(_, built)| built))
+    /// Every function, with its frame where it is not the file's own.
+    fn all(&self) -> impl Iterator<Item = (Option<&str>, &FunctionGraph)> {
+        let own = self.functions.iter().map(|built| (None, built));
+        own.chain(
+            self.frames.iter().flat_map(|(frame, functions)| {
+                functions.iter().map(move |built| (Some(frame.as_str()), built))
+            }),
+        )
     }
 
     fn takes_parameters(&self) -> bool {
-        self.all().any(|f| f.arguments().any(|a| a == Argument::Parameters))
+        self.all().any(|(_, f)| f.arguments().any(|a| a == Argument::Parameters))
     }
 }
 
@@ -143,7 +153,7 @@ fn items(model: &Model, options: &Options, parts: &Parts<'_>) -> Result<TokenStr
     let discrete = discrete::module(options);
     let constants = constants(model.arm(), parts.set, options);
     let trig = angles::trig_struct(model);
-    let angle_functions = angles::angle_functions(model, parts.all());
+    let angle_functions = angles::angle_functions(model, parts.all().map(|(_, built)| built));
     let trigonometry = angles::trigonometry(model.arm());
     let friction = friction::items(&options.friction, model.arm());
     let tests = if options.tests { tests::module(model, options)? } else { quote!() };

@@ -77,6 +77,12 @@ pub(super) fn is_number(built: &FunctionGraph) -> bool {
     matches!(built.function, Function::KineticEnergy | Function::PotentialEnergy)
 }
 
+/// Whether the result has rows and columns for every arm.
+pub(super) fn is_matrix(built: &FunctionGraph) -> bool {
+    let (rows, columns) = built.function.size();
+    rows != Size::Fixed(1) && columns != Size::Fixed(1)
+}
+
 /// The inputs that an argument brings.
 pub(super) fn input_of(argument: Argument, i: usize) -> Input {
     match argument {

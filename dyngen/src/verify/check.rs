@@ -2,7 +2,7 @@
 
 use super::head::{Head, Literals};
 use super::language::{Routines, Stop, Value, World};
-use super::{Checked, Difference, Report, Source, Unreadable, c, rust, structure_of};
+use super::{Checked, Difference, Report, Source, Unreadable, c, rust, structure_of, wgsl};
 use crate::arm::{Arm, JointKind};
 use crate::config::Language;
 use crate::dynamics::Function;
@@ -69,12 +69,11 @@ impl From<Unreadable> for Error {
 
 fn read(text: &str, language: Language, arm: &Arm) -> Checked<Source> {
     let literals = Literals::read(text, &angle_symbols(arm))?;
+    let frames: Vec<String> = arm.frames.iter().map(|frame| frame.name.clone()).collect();
     match language {
         Language::Rust => rust::read(text, &literals),
-        Language::C => {
-            let frames: Vec<String> = arm.frames.iter().map(|frame| frame.name.clone()).collect();
-            c::read(text, &literals, &frames)
-        }
+        Language::C | Language::Cuda => c::read(text, language == Language::Cuda, &literals, &frames),
+        Language::Wgsl => wgsl::read(text, &literals, &frames),
     }
 }
 
@@ -157,6 +156,9 @@ impl Verifier {
                 report.difference = self.module(&source, set, &module, model, only, &mut report.proven);
             }
         }
+        if report.difference.is_none() && only.is_none() {
+            report.proven.extend(source.kernels);
+        }
         Ok(report)
     }
 
@@ -173,7 +175,8 @@ impl Verifier {
             ("JOINT_NAMES", arm.has_joint_names().then(|| arm.joint_names())),
         ];
         let found = |name: &str| source.constants.get(name);
-        let here = |(name, _): &(&str, _)| !source.has_header || name.ends_with("_NAMES");
+        // In C the sizes stand in the header.
+        let here = |(name, _): &(&str, _)| self.language != Language::C || name.ends_with("_NAMES");
         let differs = right
             .into_iter()
             .filter(here)
@@ -250,7 +253,7 @@ impl Verifier {
                 }
                 for with in [false, true] {
                     let name = format!("{name}{}", if with { "_with" } else { "" });
-                    let prepared = with && source.has_header;
+                    let prepared = with && self.language != Language::Rust;
                     let call =
                         Call { function, name: &name, with, prepared, baked: self.values.is_some(), set };
                     let found = compared(function, |zero| call.result(&worlds[zero], &place.points[zero]));

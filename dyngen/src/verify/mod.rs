@@ -6,12 +6,16 @@
 
 mod c;
 mod check;
+mod cursor;
 mod head;
+mod kernel;
 mod language;
 mod rust;
+mod wgsl;
 
 pub use check::{Error, Verifier};
 
+use crate::dynamics::Function;
 use language::Routines;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -25,10 +29,26 @@ struct Source {
     /// Modules of frames, with their lines.
     modules: Vec<(String, usize)>,
     not_checked: Vec<String>,
-    /// Whether the numbers of joints, parameters and angles stand in a file of their own.
-    has_header: bool,
+    /// Kernels and entry points: each calls a function for many states, and does nothing else.
+    kernels: Vec<String>,
     /// Literals of many digits that the head does not explain, with their lines.
     unexplained: Vec<(usize, String)>,
+}
+
+/// What a function whose name in C stands behind the arm's is called in the language; `frames` are those of
+/// the arm.
+fn routine(name: &str, frames: &[String]) -> Option<String> {
+    let is_known = |name: &str| Function::parse(name.strip_suffix("_with").unwrap_or(name)).is_some();
+    match name {
+        "trig_of" => return Some("Trig::new".to_string()),
+        name if name == "prepare" || is_known(name) => return Some(name.to_string()),
+        _ => {}
+    }
+    let inside = |frame: &String| {
+        let rest = name.strip_prefix(frame.as_str())?.strip_prefix('_')?;
+        is_known(rest).then(|| format!("{frame}::{rest}"))
+    };
+    frames.iter().find_map(inside)
 }
 
 /// What the constant with a function's structure is called among a file's constants.

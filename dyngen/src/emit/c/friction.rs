@@ -1,6 +1,6 @@
 //! Friction of the motors in C.
 
-use super::{Item, Names, documentation, number};
+use super::{Item, Names, number};
 use crate::arm::Arm;
 use crate::emit::friction::{FRICTION_DOC, FrictionTerm, columns_doc, motor_velocities};
 
@@ -36,13 +36,10 @@ pub(super) fn items(names: &Names, terms: &[FrictionTerm], arm: &Arm) -> Vec<Ite
         return Vec::new();
     }
     let Names { upper, .. } = names;
-    let count = Item {
-        declaration: format!(
-            "/** Number of friction terms of a joint. */\n#define {upper}_FRICTION_TERMS {}\n",
-            terms.len()
-        ),
-        definition: String::new(),
-    };
+    let count = Item::Declared(format!(
+        "/** Number of friction terms of a joint. */\n#define {upper}_FRICTION_TERMS {}\n",
+        terms.len()
+    ));
     let coupled = (!arm.transmissions.is_empty()).then(|| motor_velocities(arm));
     let coupled = coupled.as_deref();
     let mut items = vec![count];
@@ -55,19 +52,17 @@ pub(super) fn items(names: &Names, terms: &[FrictionTerm], arm: &Arm) -> Vec<Ite
 /// The constant that says how coupled motors turn.
 fn matrix(names: &Names, motors: &[Vec<f64>]) -> Item {
     let Names { prefix, upper } = names;
-    let name = format!("const double {prefix}_motor_velocities[{upper}_JOINTS][{upper}_JOINTS]");
     let row = |row: &Vec<f64>| {
         let row: Vec<String> = row.iter().map(|x| format!("{x:?}")).collect();
-        format!("    {{ {} }}", row.join(", "))
+        format!("{{ {} }}", row.join(", "))
     };
-    let rows: Vec<String> = motors.iter().map(row).collect();
-    let doc = documentation(&format!(
-        "Motor i turns at the sum over joints j of `{prefix}_motor_velocities[i][j]` times their velocities, on the\n\
-         joint's side of its gear."
-    ));
-    Item {
-        declaration: format!("{doc}extern {name};\n"),
-        definition: format!("{name} = {{\n{}\n}};\n", rows.join(",\n")),
+    Item::Constants {
+        doc: format!(
+            "Motor i turns at the sum over joints j of `{prefix}_motor_velocities[i][j]` times their velocities, on the\n\
+             joint's side of its gear."
+        ),
+        declared: format!("const double {prefix}_motor_velocities[{upper}_JOINTS][{upper}_JOINTS]"),
+        values: motors.iter().map(row).collect(),
     }
 }
 
@@ -110,7 +105,7 @@ fn columns(names: &Names, terms: &[FrictionTerm], n: usize, coupled: Option<&[Ve
         "void {prefix}_friction_columns(\n    const {prefix}_real dq[{upper}_JOINTS],\n    \
          {prefix}_real result[{upper}_JOINTS][{upper}_FRICTION_TERMS])"
     );
-    item(&doc, &prototype, &body)
+    Item::Function { doc, prototype, body }
 }
 
 /// The function of the joints' friction torques, N·m; with coupled motors Mᵀ times theirs.
@@ -137,13 +132,5 @@ fn friction(names: &Names, terms: usize, n: usize, coupled: Option<&[Vec<f64>]>)
          const {prefix}_real coefficients[{upper}_JOINTS][{upper}_FRICTION_TERMS],\n    \
          {prefix}_real result[{upper}_JOINTS])"
     );
-    item(&doc, &prototype, &body)
-}
-
-fn item(doc: &str, prototype: &str, body: &[String]) -> Item {
-    let body: String = body.iter().map(|line| format!("    {line}\n")).collect();
-    Item {
-        declaration: format!("{}{prototype};\n", documentation(doc)),
-        definition: format!("{prototype}\n{{\n{body}}}\n"),
-    }
+    Item::Function { doc, prototype, body }
 }

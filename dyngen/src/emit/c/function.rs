@@ -1,12 +1,12 @@
 //! One function in C: straight-line code, one `const` for each node.
 
-use super::{Item, Names, documentation, number, positions};
+use super::{Item, Names, SYNTAX, positions};
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::{Argument, Size};
 use crate::emit::docs;
 use crate::emit::lanes::used;
-use crate::emit::statement::{self, Value, input_of, is_number};
-use crate::graph::{Graph, Input, Node, Preparation};
+use crate::emit::statement::{self, is_matrix, is_number};
+use crate::graph::{Input, Preparation};
 use crate::model::Model;
 use std::collections::BTreeSet;
 
@@ -21,21 +21,15 @@ pub(super) fn items(
 ) -> [Item; 2] {
     let needed = built.graph.needed(&built.outputs);
     let used = used(built, &needed);
-    let within = frame.map(|frame| format!("{frame}_")).unwrap_or_default();
-    let name = format!("{}_{within}{}", names.prefix, built.function.name());
+    let name = names.function(frame, built.function);
     let at =
         frame.map(|frame| format!("At the frame `{frame}` of the arm file, in place of the tool's.\n\n"));
     let doc = at.unwrap_or_default() + &doc(names, built);
     let returned = returned(names, built);
     let type_of = if is_number(built) { format!("{}_real", names.prefix) } else { "void".to_string() };
-    let item = |doc: &str, name: &str, arguments: Vec<String>, body: Vec<String>| {
+    let item = |doc: String, name: &str, arguments: Vec<String>, body: Vec<String>| {
         let arguments = arguments.into_iter().chain(returned.clone()).collect::<Vec<_>>().join(",\n    ");
-        let prototype = format!("{type_of} {name}(\n    {arguments})");
-        let body: String = body.iter().map(|line| format!("    {line}\n")).collect();
-        Item {
-            declaration: format!("{}{prototype};\n", documentation(doc)),
-            definition: format!("{prototype}\n{{\n{body}}}\n"),
-        }
+        Item::Function { doc, prototype: format!("{type_of} {name}(\n    {arguments})"), body }
     };
     let others: Vec<Argument> = built.arguments().filter(|a| *a != Argument::Positions).collect();
     let plain = [Argument::Positions].iter().chain(&others).map(|a| names.array(*a));
@@ -52,8 +46,8 @@ pub(super) fn items(
     let name_with = format!("{name}_with");
     [
         // First what the other one calls.
-        item(&doc_with, &name_with, with.collect(), computed(model, built, prepared, &needed, &used)),
-        item(&doc, &name, plain.collect(), called),
+        item(doc_with, &name_with, with.collect(), computed(model, built, prepared, &needed, &used)),
+        item(doc, &name, plain.collect(), called),
     ]
 }
 
@@ -65,12 +59,6 @@ fn doc(names: &Names, built: &FunctionGraph) -> String {
     }
     let by_row = if is_matrix(built) { ", row by row" } else { "" };
     text.replacen("\n\nReturns ", &format!("\n* `result`{by_row}: "), 1)
-}
-
-/// Whether the result has rows and columns for every arm.
-fn is_matrix(built: &FunctionGraph) -> bool {
-    let (rows, columns) = built.function.size();
-    rows != Size::Fixed(1) && columns != Size::Fixed(1)
 }
 
 /// The argument that takes the result; none where it is a number, which is returned.
@@ -139,27 +127,20 @@ fn computed(
     needed: &[usize],
     used: &BTreeSet<Input>,
 ) -> Vec<String> {
-    let mut body = positions::taken(model, used);
+    let mut body = SYNTAX.of_trig(model, used);
     if body.is_empty() {
         body.push("(void)trig;".to_string());
     }
     for argument in built.arguments().filter(|a| *a != Argument::Positions) {
-        let (name, array) = match argument {
-            Argument::Parameters => ("prepared", "prepared->values"),
-            other => (other.name(), other.name()),
-        };
-        let inputs = (0..argument.length(built.joints, prepared)).map(|i| (i, input_of(argument, i)));
-        let read: Vec<String> = inputs
-            .filter(|(_, input)| used.contains(input))
-            .map(|(i, input)| format!("const real {input} = {array}[{i}];"))
-            .collect();
+        let read = SYNTAX.of_argument(built, argument, prepared, used);
         if read.is_empty() {
+            let name = if argument == Argument::Parameters { "prepared" } else { argument.name() };
             body.push(format!("(void){name};"));
         }
         body.extend(read);
     }
     let signs = statement::signs_of(built, needed);
-    body.extend(statements(model, &built.graph, needed, &signs));
+    body.extend(SYNTAX.statements(model, &built.graph, needed, &signs));
     body.extend(results(built, &signs));
     body
 }
@@ -180,35 +161,14 @@ fn results(built: &FunctionGraph, signs: &[bool]) -> Vec<String> {
     (0..built.outputs.len()).map(line).collect()
 }
 
-/// The lines of a graph's nodes.
-fn statements(model: &Model, graph: &Graph, needed: &[usize], signs: &[bool]) -> Vec<String> {
-    let line = |node: &usize| {
-        let name = statement::value_name(graph, *node);
-        let value = match statement::value(model, graph, *node, signs)? {
-            Value::Number(x) => number(x),
-            Value::Sum(x, y) => format!("{x} + {y}"),
-            Value::Difference(x, y) => format!("{x} - {y}"),
-            Value::NegativeSum(x, y) => format!("-{x} - {y}"),
-            Value::Product(x, y) => format!("{x} * {y}"),
-            Value::Quotient(x, y) => format!("{x} / {y}"),
-        };
-        Some(format!("const real {name} = {value};"))
-    };
-    needed.iter().filter_map(line).collect()
-}
-
 /// The function that makes of the parameters what the functions need of them alone.
 pub(super) fn prepare(names: &Names, model: &Model, preparation: &Preparation) -> Item {
     let prefix = &names.prefix;
     let graph = preparation.graph();
     let needed = graph.needed(preparation.values());
-    let read = needed.iter().filter_map(|n| match graph.nodes()[*n] {
-        Node::Input(Input::Parameter(i)) => Some(format!("const real p{} = parameters[{i}];", i + 1)),
-        _ => None,
-    });
-    let mut body: Vec<String> = read.collect();
+    let mut body = SYNTAX.of_parameters(&graph, &needed);
     let signs = vec![false; graph.nodes().len()];
-    body.extend(statements(model, &graph, &needed, &signs));
+    body.extend(SYNTAX.statements(model, &graph, &needed, &signs));
     let values = preparation.values().iter().enumerate();
     body.extend(
         values.map(|(k, e)| format!("prepared->values[{k}] = {};", statement::value_name(&graph, e.node()))),
@@ -216,18 +176,17 @@ pub(super) fn prepare(names: &Names, model: &Model, preparation: &Preparation) -
     if body.is_empty() {
         body = vec!["(void)parameters;".to_string(), "prepared->values[0] = (real)0.0;".to_string()];
     }
-    let body: String = body.iter().map(|line| format!("    {line}\n")).collect();
     let operations = preparation.operations();
-    let doc = documentation(&format!(
+    let doc = format!(
         "What the functions need of the parameters alone: for those that end in `_with`.\n\n* `parameters`: {}\n\n\
          Operations: {} multiplications, {} additions.",
         names.words(Argument::Parameters.meaning()),
         operations.mul,
         operations.add
-    ));
+    );
     let prototype = format!(
         "void {prefix}_prepare(\n    {},\n    {prefix}_prepared *prepared)",
         names.array(Argument::Parameters)
     );
-    Item { declaration: format!("{doc}{prototype};\n"), definition: format!("{prototype}\n{{\n{body}}}\n") }
+    Item::Function { doc, prototype, body }
 }

@@ -1,12 +1,18 @@
-//! Generated functions as C99: a source file and its header, from the statements that the file in Rust is
-//! printed from.
+//! Generated functions as C99, a source file and its header, from the statements that the file in Rust is
+//! printed from; and with kernels around them as CUDA.
 
+mod cuda;
 mod friction;
 mod function;
 mod positions;
 
+pub use cuda::cuda_source;
+
+use super::names::Names;
+use super::syntax::Syntax;
 use super::{Options, Parts, docs, rounded};
 use crate::arm::JointKind;
+use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::{Argument, Size};
 use crate::graph::Preparation;
 use crate::model::{Error, Model};
@@ -29,19 +35,7 @@ pub struct CFiles {
 pub fn c_files(model: &Model, options: &Options, header: &str) -> Result<CFiles, Error> {
     let parts = Parts::new(model, options)?;
     let names = Names::new(&model.arm().name);
-    let mut items = constants(&names, model, &parts, options);
-    items.push(positions::trig(&names, model));
-    if parts.takes_parameters() {
-        items.extend(preparation(&names, model, &parts.preparation));
-    }
-    let prepared = parts.preparation.values().len();
-    let own = parts.functions.iter().map(|built| (None, built));
-    let at =
-        parts.frames.iter().flat_map(|(frame, f)| f.iter().map(move |built| (Some(frame.as_str()), built)));
-    for (frame, built) in own.chain(at) {
-        items.extend(function::items(&names, frame, model, built, prepared));
-    }
-    items.extend(friction::items(&names, &options.friction, model.arm()));
+    let items = items(&names, model, options, &parts, None);
     let head = |rounded: &[String]| head(&names, model, options, rounded);
     Ok(CFiles {
         header: names.header(&head(&[]), &items),
@@ -54,32 +48,74 @@ pub fn c_files(model: &Model, options: &Options, header: &str) -> Result<CFiles,
     })
 }
 
-/// A thing in C: its declaration in the header, and its definition in the source file.
-struct Item {
-    declaration: String,
-    definition: String,
+/// What is written behind a function, of its name and its graph.
+type Behind = fn(&Names, &str, &FunctionGraph) -> Item;
+
+/// What a file holds, in its order.
+fn items(
+    names: &Names,
+    model: &Model,
+    options: &Options,
+    parts: &Parts<'_>,
+    behind: Option<Behind>,
+) -> Vec<Item> {
+    let mut items = constants(names, model, parts, options);
+    items.extend(positions::trig(names, model));
+    if parts.takes_parameters() {
+        items.extend(preparation(names, model, &parts.preparation));
+    }
+    let prepared = parts.preparation.values().len();
+    for (frame, built) in parts.all() {
+        items.extend(function::items(names, frame, model, built, prepared));
+        items.extend(behind.map(|item| item(names, &names.function(frame, built.function), built)));
+    }
+    items.extend(friction::items(names, &options.friction, model.arm()));
+    items
 }
 
-/// How an arm's things are called.
-struct Names {
-    /// Before every name.
-    prefix: String,
-    /// Before every macro.
-    upper: String,
+/// A thing in C.
+enum Item {
+    /// Macros and types, with their documentation.
+    Declared(String),
+    /// An array of constants.
+    Constants {
+        doc: String,
+        declared: String,
+        values: Vec<String>,
+    },
+    Function {
+        doc: String,
+        prototype: String,
+        body: Vec<String>,
+    },
+}
+
+impl Item {
+    /// What the header says of it.
+    fn declaration(&self) -> String {
+        match self {
+            Item::Declared(text) => text.clone(),
+            Item::Constants { doc, declared, .. } => format!("{}extern {declared};\n", documentation(doc)),
+            Item::Function { doc, prototype, .. } => format!("{}{prototype};\n", documentation(doc)),
+        }
+    }
+
+    /// What stands in the source file.
+    fn definition(&self) -> Option<String> {
+        match self {
+            Item::Declared(_) => None,
+            Item::Constants { declared, values, .. } => {
+                Some(format!("{declared} = {{\n    {}\n}};\n", values.join(",\n    ")))
+            }
+            Item::Function { prototype, body, .. } => {
+                let body: String = body.iter().map(|line| format!("    {line}\n")).collect();
+                Some(format!("{prototype}\n{{\n{body}}}\n"))
+            }
+        }
+    }
 }
 
 impl Names {
-    /// The arm's name in lowercase letters, digits and `_`; `arm_` before a digit.
-    fn new(arm: &str) -> Names {
-        let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { ' ' };
-        let text: String = arm.chars().map(plain).collect();
-        let mut prefix = text.split_whitespace().collect::<Vec<_>>().join("_");
-        if !prefix.starts_with(|c: char| c.is_ascii_lowercase()) {
-            prefix = format!("arm_{prefix}").trim_end_matches('_').to_string();
-        }
-        Names { upper: prefix.to_uppercase(), prefix }
-    }
-
     fn size(&self, size: Size) -> String {
         match size {
             Size::Joints => format!("{}_JOINTS", self.upper),
@@ -93,21 +129,9 @@ impl Names {
         format!("const {}_real {}[{}]", self.prefix, argument.name(), self.size(argument.size()))
     }
 
-    /// What the documentation in Rust says, with the names in C.
-    fn words(&self, text: &str) -> String {
-        let names = [
-            ("[`PARAMETER_NAMES`]", "`NAME_parameter_names`"),
-            ("[`friction_columns`]", "`NAME_friction_columns`"),
-            ("`MOTOR_VELOCITIES[", "`NAME_motor_velocities["),
-        ];
-        names
-            .iter()
-            .fold(text.to_string(), |text, (rust, c)| text.replace(rust, &c.replace("NAME", &self.prefix)))
-    }
-
     fn header(&self, head: &str, items: &[Item]) -> String {
-        let Names { prefix, upper } = self;
-        let declarations: String = items.iter().map(|item| format!("{}\n", item.declaration)).collect();
+        let upper = &self.upper;
+        let declarations: String = items.iter().map(|item| format!("{}\n", item.declaration())).collect();
         format!(
             "{head}#ifndef {upper}_H
 #define {upper}_H
@@ -119,16 +143,25 @@ extern \"C\" {{
 /** The numbers: double, or float where {upper}_FLOAT is defined (as by -D{upper}_FLOAT), for the source file
  * and for every file that includes this one.
  */
-#ifdef {upper}_FLOAT
-typedef float {prefix}_real;
-#else
-typedef double {prefix}_real;
-#endif
-
+{}
 {declarations}#ifdef __cplusplus
 }}
 #endif
 
+#endif
+",
+            self.numbers()
+        )
+    }
+
+    /// The type of the numbers.
+    fn numbers(&self) -> String {
+        let Names { prefix, upper } = self;
+        format!(
+            "#ifdef {upper}_FLOAT
+typedef float {prefix}_real;
+#else
+typedef double {prefix}_real;
 #endif
 "
         )
@@ -136,8 +169,7 @@ typedef double {prefix}_real;
 
     fn source(&self, head: &str, helpers: &str, header: &str, items: &[Item]) -> String {
         let Names { prefix, upper } = self;
-        let definitions: Vec<&str> =
-            items.iter().map(|item| item.definition.as_str()).filter(|text| !text.is_empty()).collect();
+        let definitions: Vec<String> = items.iter().filter_map(Item::definition).collect();
         format!(
             "{head}#include \"{header}\"
 
@@ -207,6 +239,8 @@ fn helpers(names: &Names, model: &Model, options: &Options) -> String {
     parts.concat().replace("NAME", &names.upper)
 }
 
+const SYNTAX: Syntax = Syntax { value: "const real", field: "->", number };
+
 /// A number: rounded to double, then to the file's numbers, as in Rust.
 fn number(x: f64) -> String {
     format!("(real){x:?}")
@@ -227,23 +261,18 @@ fn constants(names: &Names, model: &Model, parts: &Parts<'_>, options: &Options)
     let Names { prefix, upper } = names;
     let (joints, parameters) = (model.arm().dof(), parts.set.parameters.len());
     let angles = model.angles().taken().len();
-    let mut items = vec![Item {
-        declaration: format!(
-            "/** Number of joints. */\n#define {upper}_JOINTS {joints}\n/** Number of parameters. */\n\
-             #define {upper}_PARAMETERS {parameters}\n"
-        ) + &format!(
-            "/** Angles of a {prefix}_trig: those of the joints, then sums across parallel axes. */\n\
-             #define {upper}_ANGLES {angles}\n"
-        ),
-        definition: String::new(),
-    }];
+    let mut items = vec![Item::Declared(format!(
+        "/** Number of joints. */
+#define {upper}_JOINTS {joints}
+/** Number of parameters. */
+#define {upper}_PARAMETERS {parameters}
+/** Angles of a {prefix}_trig: those of the joints, then sums across parallel axes. */
+#define {upper}_ANGLES {angles}
+"
+    ))];
     let mut array = |kind: &str, name: &str, length: &str, doc: &str, values: Vec<String>| {
         let declared = format!("{kind}{prefix}_{name}[{upper}_{length}]");
-        let lines: String = values.iter().map(|value| format!("    {value},\n")).collect();
-        items.push(Item {
-            declaration: format!("{}extern {declared};\n", documentation(doc)),
-            definition: format!("{declared} = {{\n{}\n}};\n", lines.trim_end_matches(",\n")),
-        });
+        items.push(Item::Constants { doc: doc.to_string(), declared, values });
     };
     let text = |names: Vec<String>| names.iter().map(|name| quoted(name)).collect::<Vec<_>>();
     if model.arm().has_joint_names() {
@@ -269,26 +298,15 @@ fn preparation(names: &Names, model: &Model, preparation: &Preparation) -> [Item
     let doc = documentation(&format!(
         "Sums of the parameters as the functions use them; {prefix}_prepare makes them once for any\nnumber of calls."
     ));
-    let prepared = Item {
-        declaration: format!(
-            "{doc}typedef struct {{\n    {prefix}_real values[{count}];\n}} {prefix}_prepared;\n"
-        ),
-        definition: String::new(),
-    };
+    let prepared = Item::Declared(format!(
+        "{doc}typedef struct {{\n    {prefix}_real values[{count}];\n}} {prefix}_prepared;\n"
+    ));
     [prepared, function::prepare(names, model, preparation)]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn names_begin_with_the_arm_s() {
-        let prefix = |arm: &str| Names::new(arm).prefix;
-        assert_eq!(prefix("Schunk Powerball LWA 4P"), "schunk_powerball_lwa_4p");
-        assert_eq!(prefix("2R (planar)"), "arm_2r_planar");
-        assert_eq!((prefix("ärm-7"), prefix("腕")), ("rm_7".to_string(), "arm".to_string()));
-    }
 
     #[test]
     fn no_name_ends_a_text_or_a_comment() {

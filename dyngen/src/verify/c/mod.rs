@@ -1,5 +1,8 @@
-//! Reads a generated file in C, as its sister reads Rust: whatever it does not know is an error.
+//! Reads a generated file in C, or in CUDA, as its sister reads Rust: whatever it does not know is an error.
 
+mod cuda;
+
+use super::cursor::{Cursor, Dialect};
 use super::head::Literals;
 use super::language::{Exact, Expr, Kind, Let, Pattern, Routine};
 use super::{Checked, Source, wrong};
@@ -9,7 +12,10 @@ use crate::exact::rational::integer;
 use num_traits::Zero;
 use std::collections::BTreeMap;
 
-/// What stands before the functions, with the arm's name for NAME.
+/// What is wrong where the text before the functions is another one.
+const OTHER: &str = "before the functions something else than this version of dyngen writes";
+
+/// What stands before the functions.
 const BEFORE: &str = r#"
 #include <float.h>
 #include <math.h>
@@ -27,145 +33,82 @@ const BEFORE: &str = r#"
 #endif
 "#;
 /// Sines and cosines, tested where they are written.
-const TRIGONOMETRY: &str = include_str!("../emit/c/trigonometry.c");
+const TRIGONOMETRY: &str = include_str!("../../emit/c/trigonometry.c");
 
-/// Words, numbers, strings, lines of the preprocessor and single characters (`->` is one), each with its line.
-fn tokens(text: &str) -> Vec<(usize, String)> {
-    let (mut found, mut rest, mut line) = (Vec::new(), text, 1);
-    while let Some(first) = rest.chars().next() {
-        let until =
-            |end: &str, from: usize| rest[from..].find(end).map_or(rest.len(), |k| k + from + end.len());
-        let word = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.' && first.is_ascii_digit();
-        let length = match first {
-            _ if rest.starts_with("/*") => until("*/", 2),
-            '#' => until("\n", 0),
-            '"' => {
-                let mut escaped = false;
-                let end = rest[1..].find(|c| {
-                    let ends = c == '"' && !escaped;
-                    escaped = c == '\\' && !escaped;
-                    ends
-                });
-                end.map_or(rest.len(), |k| k + 2)
-            }
-            _ if word(first) => {
-                // A number's exponent may have a sign.
-                let exponent =
-                    |k: usize| first.is_ascii_digit() && !rest.starts_with("0x") && rest[..k].ends_with('e');
-                let ends = |(k, c): (usize, char)| !(word(c) || c == '-' && exponent(k));
-                rest.char_indices().position(ends).unwrap_or(rest.len())
-            }
-            _ if rest.starts_with("->") => 2,
-            other => other.len_utf8(),
-        };
-        let (token, after) = rest.split_at(length);
-        if !first.is_whitespace() && !token.starts_with("/*") {
-            found.push((line, token.trim_end().to_string()));
-        }
-        line += token.matches('\n').count();
-        rest = after;
-    }
-    found
-}
+/// Numbers are cast: `(real)0.5`.
+const DIALECT: Dialect = Dialect { comment: ("/*", "*/"), field: "->", number: ("real", "") };
 
-/// Reads a file; `frames` are those of the arm.
-pub(super) fn read(text: &str, literals: &Literals, frames: &[String]) -> Checked<Source> {
-    let all = tokens(text);
+/// Reads a file in C, or in CUDA; `frames` are those of the arm.
+pub(super) fn read(text: &str, is_cuda: bool, literals: &Literals, frames: &[String]) -> Checked<Source> {
     let mut reader = Reader {
-        literals,
+        text: Cursor::new(text, &DIALECT, literals),
+        is_cuda,
         frames,
-        last: all.last().map_or(1, |token| token.0),
-        tokens: all.into_iter().peekable(),
         prefix: String::new(),
-        place: String::new(),
-        source: Source { has_header: true, ..Source::default() },
+        values: None,
+        source: Source::default(),
     };
-    reader.before()?;
-    while reader.peek().is_some() {
+    if is_cuda {
+        reader.before_cuda()?
+    } else {
+        reader.before()?
+    }
+    while reader.text.peek().is_some() {
         reader.item()?;
     }
-    Ok(reader.source)
+    Ok(Source { unexplained: reader.text.unexplained, ..reader.source })
 }
 
 struct Reader<'a> {
-    literals: &'a Literals,
+    text: Cursor<'a>,
+    /// Whether functions are those of a GPU's threads.
+    is_cuda: bool,
     frames: &'a [String],
-    tokens: std::iter::Peekable<std::vec::IntoIter<(usize, String)>>,
-    last: usize,
     /// `name_` of the arm.
     prefix: String,
-    /// Where literals stand: the function, then a space and the name of a value.
-    place: String,
+    /// How many values are prepared, in CUDA; in C the header says it.
+    values: Option<usize>,
     source: Source,
 }
 
 impl Reader<'_> {
-    fn peek(&mut self) -> Option<&str> {
-        self.tokens.peek().map(|token| token.1.as_str())
-    }
-
-    fn line(&mut self) -> usize {
-        self.tokens.peek().map_or(self.last, |token| token.0)
-    }
-
-    fn next(&mut self) -> String {
-        self.tokens.next().map_or(String::new(), |token| token.1)
-    }
-
-    fn takes(&mut self, wanted: &str) -> bool {
-        self.peek() == Some(wanted) && self.tokens.next().is_some()
-    }
-
-    /// The next tokens must be these, separated by spaces.
-    fn expect(&mut self, wanted: &str) -> Checked<()> {
-        for token in wanted.split(' ') {
-            let line = self.line();
-            if !self.takes(token) {
-                return wrong(line, &format!("'{token}' is expected here"));
-            }
-        }
-        Ok(())
-    }
-
     fn before(&mut self) -> Checked<()> {
-        let line = self.line();
-        let header = self.next();
+        let line = self.text.line();
+        let header = self.text.next();
         let Some(header) = header.strip_prefix("#include \"").and_then(|text| text.strip_suffix(".h\""))
         else {
             return wrong(line, "the file's header is to be included first");
         };
         self.source.not_checked.push(format!("{header}.h"));
-        self.text(BEFORE, "")?;
-        self.expect("typedef")?;
-        self.prefix = self.next().trim_end_matches("real").to_string();
-        self.expect("real ;")?;
-        if self.peek().is_some_and(|token| token.starts_with('#')) {
-            let upper = self.prefix.trim_end_matches('_').to_uppercase();
-            self.text(TRIGONOMETRY, &upper)?;
+        self.text.text(BEFORE, OTHER)?;
+        self.text.expect("typedef")?;
+        self.prefix = self.text.next().trim_end_matches("real").to_string();
+        self.text.expect("real ;")?;
+        // An arm whose joints all slide has no sines.
+        if self.text.peek().is_some_and(|token| token.starts_with('#')) {
+            self.text.text(&TRIGONOMETRY.replace("NAME", &self.upper()), OTHER)?;
         }
         Ok(())
     }
 
-    /// Text that must be what this version of dyngen writes.
-    fn text(&mut self, wanted: &str, name: &str) -> Checked<()> {
-        for (_, token) in tokens(&wanted.replace("NAME", name)) {
-            let line = self.line();
-            if !self.takes(&token) {
-                return wrong(line, "before the functions something else than this version of dyngen writes");
-            }
-        }
-        Ok(())
+    /// What begins the names of macros.
+    fn upper(&self) -> String {
+        self.prefix.trim_end_matches('_').to_uppercase()
     }
 
     fn item(&mut self) -> Checked<()> {
-        let line = self.line();
-        let mut words = Vec::new();
-        while self.peek().is_some_and(|token| !"([=;{#".contains(&token[..1])) {
-            words.push(self.next());
-        }
+        let line = self.text.line();
+        let words = self.text.until("([=;{#");
         let name = words.last().cloned().unwrap_or_default();
         let name = name.strip_prefix(&self.prefix).unwrap_or(&name).to_string();
         let kind = words[..words.len().saturating_sub(1)].join(" ");
+        let kind = match self.is_cuda {
+            true => match self.of_cuda(line, &kind, &name)? {
+                Some(kind) => kind,
+                None => return Ok(()),
+            },
+            false => kind,
+        };
         match (kind.as_str(), name.as_str()) {
             ("static real", "sign" | "tangent") | ("void", "friction" | "friction_columns") => {
                 self.skip(name, "}")
@@ -183,7 +126,13 @@ impl Reader<'_> {
     /// An item that is not looked into.
     fn skip(&mut self, name: String, end: &str) -> Checked<()> {
         let mut depth = 0;
-        for (_, token) in self.tokens.by_ref() {
+        while self.text.peek().is_some() {
+            let line = self.text.line();
+            let token = self.text.next();
+            // A macro would change what stands behind it.
+            if token.starts_with('#') && name != "tangent" {
+                return wrong(line, "a line of the preprocessor that dyngen does not write");
+            }
             depth += i32::from(token == "{") - i32::from(token == "}");
             if depth == 0 && token == end {
                 break;
@@ -194,37 +143,27 @@ impl Reader<'_> {
     }
 
     fn constant(&mut self, line: usize, name: String) -> Checked<()> {
-        while self.peek().is_some_and(|token| token != "{") {
-            self.next();
+        while self.text.peek().is_some_and(|token| token != "{") {
+            self.text.next();
         }
         let mut entries = Vec::new();
-        while self.peek().is_some_and(|token| token != "}") {
-            self.next();
-            let sign = if self.takes("-") { "-" } else { "" };
-            let text = self.next();
+        while self.text.peek().is_some_and(|token| token != "}") {
+            self.text.next();
+            let sign = if self.text.takes("-") { "-" } else { "" };
+            let text = self.text.next();
             let inside = text.strip_prefix('"').and_then(|text| text.strip_suffix('"'));
             let plain =
                 inside.map(|text| text.replace("\\\"", "\"").replace("\\?", "?").replace("\\\\", "\\"));
             entries.push(plain.unwrap_or(format!("{sign}{text}")));
         }
-        self.expect("} ;")?;
+        self.text.expect("} ;")?;
         self.source.constants.insert(name, (line, entries));
         Ok(())
     }
 
     /// The name that a function has in the language.
     fn routine(&self, name: &str) -> Option<String> {
-        let is_known = |name: &str| Function::parse(name.strip_suffix("_with").unwrap_or(name)).is_some();
-        match name {
-            "trig_of" => return Some("Trig::new".to_string()),
-            name if name == "prepare" || is_known(name) => return Some(name.to_string()),
-            _ => {}
-        }
-        let inside = |frame: &String| {
-            let rest = name.strip_prefix(frame.as_str())?.strip_prefix('_')?;
-            is_known(rest).then(|| format!("{frame}::{rest}"))
-        };
-        self.frames.iter().find_map(inside)
+        super::routine(name, self.frames)
     }
 
     fn function(&mut self, line: usize, name: &str) -> Checked<()> {
@@ -232,20 +171,19 @@ impl Reader<'_> {
             return wrong(line, &format!("dyngen writes no function {name}"));
         };
         let parameters = self.parameters()?;
-        self.place = name.clone();
+        self.text.place = name.clone();
         let mut body = Body { lets: Vec::new(), slots: BTreeMap::new(), results: Vec::new(), called: None };
-        self.expect("{")?;
-        while self.peek().is_some_and(|token| token != "}") {
+        self.text.expect("{")?;
+        while self.text.peek().is_some_and(|token| token != "}") {
             self.statement(&mut body)?;
         }
-        let end = self.line();
-        self.expect("}")?;
+        let end = self.text.line();
+        self.text.expect("}")?;
         let result = match (name.as_str(), body.called.take()) {
             (_, Some(call)) => call,
             ("Trig::new", None) => body.trig(end),
             ("prepare", None) => {
-                let values = body.results.into_iter().map(|(_, value)| value).collect();
-                let list = Expr { line: end, kind: Kind::List(values) };
+                let list = Expr { line: end, kind: Kind::List(self.prepared(end, body.results)?) };
                 Expr { line: end, kind: Kind::AsPrepared(Box::new(list)) }
             }
             (name, None) => matrix(name, end, body.results)?,
@@ -257,16 +195,26 @@ impl Reader<'_> {
         }
     }
 
+    /// What is prepared; every value must be written once, in order, and as many as the struct has where it
+    /// is known.
+    fn prepared(&self, end: usize, results: Vec<(Vec<usize>, Expr)>) -> Checked<Vec<Expr>> {
+        if self.values.is_some_and(|count| count != results.len()) {
+            return wrong(end, "other values than the struct has");
+        }
+        let value = |(k, (at, value)): (usize, (Vec<usize>, Expr))| match at == [k] {
+            true => Ok(value),
+            false => wrong(value.line, "a prepared value that is not the next one"),
+        };
+        results.into_iter().enumerate().map(value).collect()
+    }
+
     /// The names of what a function reads.
     fn parameters(&mut self) -> Checked<Vec<String>> {
         let mut read = Vec::new();
-        self.expect("(")?;
+        self.text.expect("(")?;
         loop {
-            let line = self.line();
-            let mut words = Vec::new();
-            while self.peek().is_some_and(|token| token != "," && token != ")") {
-                words.push(self.next());
-            }
+            let line = self.text.line();
+            let words = self.text.until(",)");
             let text = words.join(" ").replace(&self.prefix, "").replace(&self.prefix.to_uppercase(), "");
             let parts: Vec<&str> = text.split(' ').collect();
             match parts[..] {
@@ -282,68 +230,62 @@ impl Reader<'_> {
                 ["trig", "*", "trig"] | ["prepared", "*", "prepared"] | ["real", "result", ..] => {}
                 _ => return wrong(line, "a parameter that dyngen does not write"),
             }
-            if !self.takes(",") {
+            if !self.text.takes(",") {
                 break;
             }
         }
-        self.expect(")")?;
+        self.text.expect(")")?;
         Ok(read)
     }
 
     fn statement(&mut self, body: &mut Body) -> Checked<()> {
-        let line = self.line();
-        let first = self.next();
+        let line = self.text.line();
+        let first = self.text.next();
         let own = first.strip_prefix(&self.prefix).map(str::to_string);
         let done = body.called.is_some() || !body.results.is_empty();
         match (first.as_str(), own.as_deref()) {
-            ("const", _) if self.takes("real") && !done => {
-                let name = self.next();
-                let outside = std::mem::take(&mut self.place);
-                self.place = format!("{outside} {name}");
-                self.expect("=")?;
-                let value = self.sum()?;
-                self.place = outside;
-                body.lets.push(Let { pattern: Pattern::Name(name), value });
-                self.expect(";")
+            ("const", _) if self.text.takes("real") && !done => {
+                body.lets.push(self.text.named()?);
+                Ok(())
             }
             ("const", _) if !done => {
                 // Nothing of it is read.
-                self.next();
-                self.expect("trig =")?;
+                self.text.next();
+                self.text.expect("trig =")?;
                 let zeros = ["{", "(", "real", ")", "0.0", ",", "}"];
-                while self.peek().is_some_and(|token| zeros.contains(&token)) {
-                    self.next();
+                while self.text.peek().is_some_and(|token| zeros.contains(&token)) {
+                    self.text.next();
                 }
-                self.expect(";")
+                self.text.expect(";")
             }
             ("(", _) => {
-                self.expect("void )")?;
-                self.next();
-                self.expect(";")
+                self.text.expect("void )")?;
+                self.text.next();
+                self.text.expect(";")
             }
-            (_, Some("trig")) => self.expect("trig ;"),
-            (_, Some("prepared")) => self.expect("prepared ;"),
+            (_, Some("trig")) => self.text.expect("trig ;"),
+            (_, Some("prepared")) => self.text.expect("prepared ;"),
             ("sin_cos", _) if !done => {
-                self.expect("(")?;
-                let angle = self.sum()?;
-                self.expect(", &")?;
+                self.text.expect("(")?;
+                let angle = self.text.sum()?;
+                self.text.expect(", &")?;
                 let sine = self.slot(body, "sin")?;
-                self.expect(", &")?;
+                self.text.expect(", &")?;
                 let cosine = self.slot(body, "cos")?;
-                self.expect(") ;")?;
+                self.text.expect(") ;")?;
                 let value = Expr { line, kind: Kind::SinCos(Box::new(angle)) };
                 body.lets.push(Let { pattern: Pattern::List(vec![sine, cosine]), value });
                 Ok(())
             }
             ("trig", _) if !done => {
                 let pattern = self.slot_after(body, line, &["sin", "cos", "position"])?;
-                self.expect("=")?;
-                let value = self.sum()?;
+                self.text.expect("=")?;
+                let value = self.text.sum()?;
                 body.lets.push(Let { pattern, value });
-                self.expect(";")
+                self.text.expect(";")
             }
             (_, Some("prepare")) if !done => {
-                self.expect("( parameters , & prepared ) ;")?;
+                self.text.expect("( parameters , & prepared ) ;")?;
                 let parameters = Expr { line, kind: Kind::Name("parameters".to_string()) };
                 let value = Expr { line, kind: Kind::Prepared(Box::new(parameters)) };
                 body.lets.push(Let { pattern: Pattern::Name("prepared".to_string()), value });
@@ -351,28 +293,28 @@ impl Reader<'_> {
             }
             ("result", _) | ("prepared", _) if body.called.is_none() => {
                 if first == "prepared" {
-                    self.expect("-> values")?;
+                    self.text.expect("-> values")?;
                 }
                 let mut at = Vec::new();
-                while self.peek() == Some("[") {
-                    at.push(self.index()?);
+                while self.text.peek() == Some("[") {
+                    at.push(self.text.index()?);
                 }
-                self.expect("=")?;
-                let value = self.sum()?;
+                self.text.expect("=")?;
+                let value = self.text.sum()?;
                 body.results.push((at, value));
-                self.expect(";")
+                self.text.expect(";")
             }
             ("return", _) if !done => {
                 let prefix = self.prefix.clone();
                 if let Some(name) =
-                    self.peek().and_then(|token| token.strip_prefix(&prefix)).map(str::to_string)
+                    self.text.peek().and_then(|token| token.strip_prefix(&prefix)).map(str::to_string)
                 {
-                    self.next();
+                    self.text.next();
                     return self.call(body, line, &name);
                 }
-                let value = self.sum()?;
+                let value = self.text.sum()?;
                 body.results.push((vec![0], value));
-                self.expect(";")
+                self.text.expect(";")
             }
             (_, Some(name)) if !done => self.call(body, line, name),
             _ => wrong(line, "a statement that dyngen does not write here"),
@@ -384,113 +326,36 @@ impl Reader<'_> {
         let Some(name) = self.routine(name).filter(|name| name.ends_with("_with")) else {
             return wrong(line, "a call that dyngen does not write");
         };
-        self.expect("( & trig")?;
+        self.text.expect("( & trig")?;
         let mut arguments = vec![body.trig(line)];
-        while self.takes(",") {
-            self.takes("&");
-            let name = self.next();
+        while self.text.takes(",") {
+            self.text.takes("&");
+            let name = self.text.next();
             if name != "result" {
                 arguments.push(Expr { line, kind: Kind::Name(name) });
             }
         }
         body.called = Some(Expr { line, kind: Kind::Call(name, arguments) });
-        self.expect(") ;")
+        self.text.expect(") ;")
     }
 
     /// A place of the struct of sines and cosines, as the name of its value.
     fn slot(&mut self, body: &mut Body, field: &str) -> Checked<Pattern> {
-        let line = self.line();
-        self.expect("trig")?;
+        let line = self.text.line();
+        self.text.expect("trig")?;
         self.slot_after(body, line, &[field])
     }
 
     fn slot_after(&mut self, body: &mut Body, line: usize, fields: &[&str]) -> Checked<Pattern> {
-        let (access, field) = (self.next(), self.next());
+        let (access, field) = (self.text.next(), self.text.next());
         if !["->", "."].contains(&access.as_str()) || !fields.contains(&field.as_str()) {
             return wrong(line, "another place than dyngen fills here");
         }
-        let index = self.index()?;
+        let index = self.text.index()?;
         let name = format!("trig.{field}[{index}]");
         match body.slots.insert((field, index), name.clone()) {
             None => Ok(Pattern::Name(name)),
             Some(_) => wrong(line, "a place that is filled twice"),
-        }
-    }
-
-    fn index(&mut self) -> Checked<usize> {
-        self.expect("[")?;
-        let line = self.line();
-        let Ok(index) = self.next().parse() else { return wrong(line, "a number is expected here") };
-        self.expect("]")?;
-        Ok(index)
-    }
-
-    fn sum(&mut self) -> Checked<Expr> {
-        self.operations(&["+", "-"])
-    }
-
-    fn operations(&mut self, of: &[&str]) -> Checked<Expr> {
-        let line = self.line();
-        let mut value = self.operand(of)?;
-        while let Some(operation) =
-            self.peek().filter(|token| of.contains(token)).and_then(|t| t.chars().next())
-        {
-            self.next();
-            let other = self.operand(of)?;
-            value = Expr { line, kind: Kind::Binary(operation, Box::new(value), Box::new(other)) };
-        }
-        Ok(value)
-    }
-
-    fn operand(&mut self, of: &[&str]) -> Checked<Expr> {
-        if of == ["+", "-"] { self.operations(&["*", "/"]) } else { self.atom() }
-    }
-
-    fn atom(&mut self) -> Checked<Expr> {
-        let line = self.line();
-        let kind = match self.next().as_str() {
-            "-" => Kind::Negative(Box::new(self.atom()?)),
-            "(" if self.takes("real") => {
-                self.expect(")")?;
-                let negative = self.takes("-");
-                let number = Expr { line, kind: self.literal(line)? };
-                if negative { Kind::Negative(Box::new(number)) } else { return Ok(number) }
-            }
-            "(" => {
-                let value = self.sum()?;
-                self.expect(")")?;
-                return Ok(value);
-            }
-            word if word.starts_with(|c: char| c.is_ascii_lowercase()) => {
-                let name = Expr { line, kind: Kind::Name(word.to_string()) };
-                if self.takes("->") {
-                    let field = self.next();
-                    let list = match field.as_str() {
-                        "values" => name,
-                        _ => Expr { line, kind: Kind::Field(Box::new(name), field) },
-                    };
-                    Kind::Index(Box::new(list), self.index()?)
-                } else if self.peek() == Some("[") {
-                    // A vector is the one column of a matrix.
-                    let column = Expr { line, kind: Kind::Index(Box::new(name), 0) };
-                    Kind::Index(Box::new(column), self.index()?)
-                } else {
-                    return Ok(name);
-                }
-            }
-            _ => return wrong(line, "an expression that dyngen does not write"),
-        };
-        Ok(Expr { line, kind })
-    }
-
-    fn literal(&mut self, line: usize) -> Checked<Kind> {
-        let digits = self.next();
-        if self.literals.is_unexplained(&digits) {
-            self.source.unexplained.push((line, digits.clone()));
-        }
-        match self.literals.exact(&digits, &self.place) {
-            Some(exact) => Ok(Kind::Number(exact)),
-            None => wrong(line, &format!("{digits} is no number that dyngen writes")),
         }
     }
 }
