@@ -1,4 +1,5 @@
-//! `powerball identify --export`: what was identified goes back into the URDF that the arm came from.
+//! What was found goes where it is used: `powerball identify --export` into the URDF that the arm came from,
+//! `powerball export` into the words of a robot's controller.
 
 #![allow(clippy::unwrap_used)]
 
@@ -132,4 +133,42 @@ fn the_original_is_never_written_over() {
     assert!(String::from_utf8_lossy(&refused.stderr).contains("--export would write over it"));
     assert_eq!(fs::read_to_string(folder.join("two.urdf")).unwrap(), URDF);
     assert!(!folder.join("identified.json").exists());
+}
+
+/// A file of the command's own is written anew, one of somebody else is not, and what holds no load is refused.
+#[test]
+fn a_load_is_exported_for_each_controller() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("export_load");
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).unwrap();
+    let explained = |mass: f64| {
+        format!(
+            r#"{{"effects": [{{"effect": "payload", "joints": [6], "relative_std": [0.01],
+              "parameters": {{"mass": {mass}, "com": [0, 0, 0], "com_in_link": [0.01, 0.02, 0.03], "start_time": [0]}}}}]}}"#
+        )
+    };
+    let export = |arguments: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_powerball"));
+        command.current_dir(&folder).arg("export").args(arguments.split_whitespace()).output().unwrap()
+    };
+    let code = |output: &Output| output.status.code().unwrap();
+    for mass in [1.5, 2.5] {
+        fs::write(folder.join("explained.json"), explained(mass)).unwrap();
+        for form in ["franka", "ur", "kuka", "kinova", "doosan", "xarm"] {
+            let done = export(&format!("--for {form} explained.json -o load.{form}"));
+            assert_eq!(code(&done), 0, "{form}: {}", String::from_utf8_lossy(&done.stderr));
+            assert!(String::from_utf8_lossy(&done.stdout).contains("inertia"), "{form}");
+            let text = fs::read_to_string(folder.join(format!("load.{form}"))).unwrap();
+            assert!(text.contains(&mass.to_string()), "{form}: {text}");
+        }
+    }
+    fs::write(folder.join("mine.script"), "set_payload(3)\n").unwrap();
+    assert_eq!(code(&export("--for ur explained.json -o mine.script")), 2);
+    assert_eq!(code(&export("--for ur explained.json -o mine.script --force")), 0);
+    fs::write(folder.join("none.json"), r#"{"effects": []}"#).unwrap();
+    let none = export("--for ur none.json -o none.script");
+    assert!(String::from_utf8_lossy(&none.stderr).contains("none.json: no payload was found"));
+    assert_eq!((code(&none), folder.join("none.script").exists()), (1, false));
+    assert_eq!(code(&export("--for ur missing.json -o none.script")), 2);
+    assert_eq!(code(&export("--for abb explained.json -o none.script")), 2);
 }

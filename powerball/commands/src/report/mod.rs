@@ -32,6 +32,7 @@ pub mod followed;
 pub mod identified;
 pub mod inspected;
 mod live;
+pub mod load;
 mod page;
 pub mod sections;
 pub mod verified;

@@ -1,7 +1,7 @@
 //! What would explain that two fits differ, and all of it in a sentence.
 
 use super::differences::{Differences, Inertia};
-use super::result::Cause;
+use super::result::{Body, Cause};
 use crate::estimate::Solver;
 use crate::estimate::distribution::f_tail;
 use dyngen::arm::sum::parse_sum;
@@ -37,7 +37,8 @@ pub(super) fn causes(joints: usize, found: &Differences) -> Vec<Cause> {
 /// The link of which ten inertial parameters explain all that differs, where there is one: the last where it does so
 /// nearly as well as the best.
 fn payload(joints: usize, found: &Differences) -> Option<Cause> {
-    let loads: Vec<Load> = (0..joints).rev().filter_map(|link| Load::of(link, found)).collect();
+    let loads: Vec<Load> =
+        (0..joints).rev().filter_map(|link| Load::of(link, link + 1 == joints, found)).collect();
     let least = loads.iter().map(|load| load.left).reduce(f64::min)?;
     let load = loads.iter().find(|load| load.left <= AS_WELL * least)?;
     load.is_enough(found).then(|| load.cause())
@@ -46,6 +47,8 @@ fn payload(joints: usize, found: &Differences) -> Option<Cause> {
 /// What a body on a link explains of the inertial difference.
 struct Load {
     link: usize,
+    /// Whether it is the last one.
+    last: bool,
     /// By parameter of a body: its value and its variance, where the logs tell it.
     values: Vec<Option<[f64; 2]>>,
     /// χ² of the difference, and what of it is left.
@@ -64,7 +67,7 @@ fn of_a_body() -> impl Iterator<Item = ParameterKind> {
 
 impl Load {
     /// By generalised least squares over the minimal set, whose parameters say in their names what they are sums of.
-    fn of(link: usize, found: &Differences) -> Option<Load> {
+    fn of(link: usize, last: bool, found: &Differences) -> Option<Load> {
         let sums: Vec<Vec<(Parameter, f64)>> = found
             .parameters
             .iter()
@@ -89,7 +92,7 @@ impl Load {
         let free = weights.kept().len().checked_sub(solver.kept().len()).filter(|free| *free > 0)? as f64;
         let variances = solver.inverse_diagonal();
         let value = |k: usize| solver.kept().contains(&k).then(|| [load[k], variances[k]]);
-        Some(Load { link, values: (0..columns.len()).map(value).collect(), all, left, free })
+        Some(Load { link, last, values: (0..columns.len()).map(value).collect(), all, left, free })
     }
 
     fn is_enough(&self, found: &Differences) -> bool {
@@ -102,7 +105,32 @@ impl Load {
         let mass = value(ParameterKind::M).map(|[mass, variance]| [mass, variance.sqrt()]);
         let moments = [ParameterKind::Mx, ParameterKind::My, ParameterKind::Mz];
         let square: f64 = moments.into_iter().filter_map(value).map(|[moment, _]| moment * moment).sum();
-        Cause::Payload { link: self.link + 1, mass, first_moment: square.sqrt() }
+        let body = if self.last { self.body() } else { None };
+        Cause::Payload { link: self.link + 1, mass, first_moment: square.sqrt(), body }
+    }
+
+    /// All of it, where mass and centre are determined.
+    fn body(&self) -> Option<Body> {
+        let value = |kind: ParameterKind| self.values[of_a_body().position(|k| k == kind)?];
+        let [mass, variance] = value(ParameterKind::M)?;
+        let mut com = [0.0; 3];
+        for (centre, kind) in com.iter_mut().zip([ParameterKind::Mx, ParameterKind::My, ParameterKind::Mz]) {
+            *centre = value(kind)?[0] / mass;
+        }
+        // About the frame's origin; products of inertia are less the tensor's elements. Then about the centre (Steiner).
+        let [x, y, z] = com;
+        let about_centre = [
+            (ParameterKind::Ixx, 1.0, y * y + z * z),
+            (ParameterKind::Ixy, -1.0, -x * y),
+            (ParameterKind::Ixz, -1.0, -x * z),
+            (ParameterKind::Iyy, 1.0, x * x + z * z),
+            (ParameterKind::Iyz, -1.0, -y * z),
+            (ParameterKind::Izz, 1.0, x * x + y * y),
+        ]
+        .map(|(kind, sign, moved)| Some(sign * value(kind)?[0] - mass * moved));
+        let inertia: Option<Vec<f64>> = about_centre.into_iter().collect();
+        let inertia = inertia.and_then(|all| all.try_into().ok());
+        Some(Body { mass, mass_std: variance.sqrt(), com, inertia })
     }
 }
 
@@ -130,7 +158,7 @@ pub(super) fn sentence(found: &Differences, causes: &[Cause]) -> String {
 
 fn in_words(cause: &Cause) -> String {
     match cause {
-        Cause::Payload { link, mass, first_moment } => {
+        Cause::Payload { link, mass, first_moment, .. } => {
             let moment = format!("first moments that the logs tell differ by {first_moment:.3} kg·m");
             match mass {
                 Some([mass, std]) => {

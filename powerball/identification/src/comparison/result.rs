@@ -154,8 +154,10 @@ pub enum Cause {
         link: usize,
         /// How much heavier `b` is, kg, and its standard error, where the logs tell it.
         mass: Option<[f64; 2]>,
-        /// The size of the difference of first moments about the link's frame, kg·m: of the parts that the logs tell.
+        /// The size of the difference of first moments about the link's frame, kg·m: of the parts that the logs determine.
         first_moment: f64,
+        /// All of it, where it is on the last link and the logs determine mass and centre.
+        body: Option<Body>,
     },
     /// Inertial parameters differ, and not as a body on one link would make them.
     Inertia {
@@ -179,6 +181,20 @@ pub enum Cause {
     /// Friction differs on most joints and nothing else does: another unit of the same kind, or another
     /// temperature.
     AnotherUnit,
+}
+
+/// A rigid body on the last link.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Body {
+    /// Mass, kg.
+    pub mass: f64,
+    /// Standard error of the mass, kg.
+    pub mass_std: f64,
+    /// Centre of mass in the last link's frame of the arm file's table, m.
+    pub com: [f64; 3],
+    /// Tensor of inertia about the centre of mass along the axes of that frame, kg·m²: xx, xy, xz, yy, yz, zz. `None`
+    /// where the logs do not determine all of it.
+    pub inertia: Option<[f64; 6]>,
 }
 
 /// Why two fits cannot be compared.

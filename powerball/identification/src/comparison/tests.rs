@@ -108,10 +108,21 @@ fn a_payload_is_reported_with_its_mass() {
     (last.mass, last.moment, last.inertia) =
         (last.mass + load.mass, last.moment + load.moment, last.inertia + load.inertia);
     let loaded = compared(a, &fitted(&body, links, table(), 5));
-    let Some(Cause::Payload { link: 6, mass: Some([mass, std]), .. }) = loaded.causes.first() else {
+    let Some(Cause::Payload { link: 6, mass: Some([mass, std]), body: Some(body), .. }) =
+        loaded.causes.first()
+    else {
         panic!("{}", loaded.sentence)
     };
     assert!((mass - 1.0).abs() < 4.0 * std && *std < 0.2, "{mass} ± {std}");
+    assert_eq!((body.mass, body.mass_std), (*mass, *std));
+    for (found, truth) in body.com.iter().zip([0.02, 0.0, 0.1]) {
+        approx::assert_relative_eq!(*found, truth, epsilon = 0.02);
+    }
+    // A cube: 1 kg · (0.05 m)² / 6 about each axis of its centre.
+    let inertia = body.inertia.unwrap();
+    for (found, truth) in inertia.iter().zip([1.0, 0.0, 0.0, 1.0, 0.0, 1.0]) {
+        approx::assert_relative_eq!(*found, truth * 0.05f64.powi(2) / 6.0, epsilon = 0.01);
+    }
     assert!(!loaded.friction.iter().any(|f| f.differs), "{}", loaded.sentence);
 }
 

@@ -7,6 +7,7 @@ mod envelope;
 mod events;
 mod excite;
 mod explain;
+mod export;
 mod float;
 mod follow;
 mod friction;
@@ -85,6 +86,8 @@ enum Command {
     Explain(explain::Explain),
     /// Write a model with its effects as one Rust file for a controller.
     Generate(generate::Generate),
+    /// Write a load that was found in the form of a robot's controller.
+    Export(export::Export),
     /// Say when a model no longer holds, along logs or a stream: since when, on which joints and why.
     Watch(watch::WatchCommand),
     /// Print what completes this program's words in a shell.
@@ -114,6 +117,7 @@ impl Command {
             Command::Compare(command) => command.run(),
             Command::Explain(command) => command.run(verbosity),
             Command::Generate(command) => command.run(),
+            Command::Export(command) => command.run(),
             Command::Watch(command) => command.run(),
             Command::Completions(command) => command.run(),
             Command::Man(command) => command.run(),
