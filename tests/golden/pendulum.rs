@@ -524,7 +524,7 @@ mod trigonometry {
         2.08757232129817482790e-09,
         -1.13596475577881948265e-11,
     ];
-    /// The same in single precision, interpolated at Chebyshev points.
+    /// Coefficients of the sine in single precision, interpolated at Chebyshev points.
     const SINE_SINGLE: [f64; 4] = [
         -0.1666666716337204,
         0.008333331905305386,

@@ -56,6 +56,8 @@ struct Load {
     left: f64,
     /// Degrees of freedom of that.
     free: f64,
+    /// Of the normal equations of the body's parameters.
+    solver: Solver,
 }
 
 /// A link does as well as another one where it leaves at most this many times as much.
@@ -92,7 +94,8 @@ impl Load {
         let free = weights.kept().len().checked_sub(solver.kept().len()).filter(|free| *free > 0)? as f64;
         let variances = solver.inverse_diagonal();
         let value = |k: usize| solver.kept().contains(&k).then(|| [load[k], variances[k]]);
-        Some(Load { link, last, values: (0..columns.len()).map(value).collect(), all, left, free })
+        let values = (0..columns.len()).map(value).collect();
+        Some(Load { link, last, values, all, left, free, solver })
     }
 
     fn is_enough(&self, found: &Differences) -> bool {
@@ -111,26 +114,45 @@ impl Load {
 
     /// All of it, where mass and centre are determined.
     fn body(&self) -> Option<Body> {
-        let value = |kind: ParameterKind| self.values[of_a_body().position(|k| k == kind)?];
+        let place = |kind: ParameterKind| of_a_body().position(|k| k == kind);
+        let value = |kind: ParameterKind| self.values[place(kind)?];
         let [mass, variance] = value(ParameterKind::M)?;
+        let moments = [ParameterKind::Mx, ParameterKind::My, ParameterKind::Mz];
         let mut com = [0.0; 3];
-        for (centre, kind) in com.iter_mut().zip([ParameterKind::Mx, ParameterKind::My, ParameterKind::Mz]) {
+        for (centre, kind) in com.iter_mut().zip(moments) {
             *centre = value(kind)?[0] / mass;
         }
-        // About the frame's origin; products of inertia are less the tensor's elements. Then about the centre (Steiner).
-        let [x, y, z] = com;
-        let about_centre = [
-            (ParameterKind::Ixx, 1.0, y * y + z * z),
-            (ParameterKind::Ixy, -1.0, -x * y),
-            (ParameterKind::Ixz, -1.0, -x * z),
-            (ParameterKind::Iyy, 1.0, x * x + z * z),
-            (ParameterKind::Iyz, -1.0, -y * z),
-            (ParameterKind::Izz, 1.0, x * x + y * y),
-        ]
-        .map(|(kind, sign, moved)| Some(sign * value(kind)?[0] - mass * moved));
-        let inertia: Option<Vec<f64>> = about_centre.into_iter().collect();
-        let inertia = inertia.and_then(|all| all.try_into().ok());
-        Some(Body { mass, mass_std: variance.sqrt(), com, inertia })
+        // Products of inertia are the negative of the tensor's elements. About the frame's origin there is more than about
+        // the centre, by m·(|c|²·E − c·cᵀ) (Steiner).
+        let tensor = [
+            (ParameterKind::Ixx, 0, 0),
+            (ParameterKind::Ixy, 0, 1),
+            (ParameterKind::Ixz, 0, 2),
+            (ParameterKind::Iyy, 1, 1),
+            (ParameterKind::Iyz, 1, 2),
+            (ParameterKind::Izz, 2, 2),
+        ];
+        let about_centre = tensor.map(|(kind, i, k)| {
+            let (sign, square) = if i == k { (1.0, com.iter().map(|c| c * c).sum()) } else { (-1.0, 0.0) };
+            let element = sign * value(kind)?[0] - mass * (square - com[i] * com[k]);
+            // Along the parameters, with c = (mx, my, mz)/m.
+            let mut slope = vec![0.0; self.values.len()];
+            slope[place(kind)?] = sign;
+            slope[place(ParameterKind::M)?] = square - com[i] * com[k];
+            for (axis, kind) in moments.into_iter().enumerate() {
+                let own = if i == k { 2.0 * com[axis] } else { 0.0 };
+                let of = |a: usize, b: usize| if axis == a { com[b] } else { 0.0 };
+                slope[place(kind)?] = of(i, k) + of(k, i) - own;
+            }
+            let variance: f64 = slope.iter().zip(self.solver.solve(&slope)).map(|(a, b)| a * b).sum();
+            Some([element, variance.max(0.0).sqrt()])
+        });
+        let all: Option<Vec<[f64; 2]>> = about_centre.into_iter().collect();
+        let part = |which: usize| {
+            let entries = all.as_ref()?.iter().map(|both| both[which]).collect::<Vec<_>>();
+            entries.try_into().ok()
+        };
+        Some(Body { mass, mass_std: variance.sqrt(), com, inertia: part(0), inertia_std: part(1) })
     }
 }
 

@@ -195,6 +195,8 @@ pub struct Body {
     /// Tensor of inertia about the centre of mass along the axes of that frame, kg·m²: xx, xy, xz, yy, yz, zz. `None`
     /// where the logs do not determine all of it.
     pub inertia: Option<[f64; 6]>,
+    /// Standard errors of these.
+    pub inertia_std: Option<[f64; 6]>,
 }
 
 /// Why two fits cannot be compared.

@@ -4,10 +4,10 @@
 
 use super::super::comparison::History;
 use super::super::model::Model;
-use super::super::named::{FitErrors, NamedEffect, Rival};
+use super::super::named::{FitErrors, NamedEffect, Rival, TAKEN_BACK};
 use super::super::study::Study;
 use super::verdict::needs_no_name;
-use crate::effects::Context;
+use crate::effects::{Candidate, Context};
 use powerball_controller::JointNumber;
 use powerball_logs::parallel;
 use powerball_logs::regression::Data;
@@ -85,13 +85,27 @@ pub(crate) fn unattributed(
     (unattributed, unexplained, dependencies)
 }
 
-/// The effects that were refused on joints without being named on one of them.
+/// The effects that were refused on joints without being named on one of them, by the last step or before.
 fn considered(history: &History, joints: &[JointNumber], named: &[NamedEffect]) -> Vec<Rival> {
-    let on_these = |rival: &&Rival| {
+    let on_these = |rival: &Rival| {
         rival.joints.iter().any(|joint| joints.contains(joint))
             && !named.iter().any(|effect| effect.is(&rival.effect, &rival.joints))
     };
-    history.refused.iter().filter(on_these).cloned().collect()
+    let taken_back = |proposal: &Vec<Candidate>| {
+        let mut joints: Vec<JointNumber> = proposal.iter().flat_map(|c| c.joints.clone()).collect();
+        joints.sort_unstable();
+        joints.dedup();
+        let effect = proposal.first()?.effect().name().to_string();
+        Some(Rival { effect, joints, alike: false, why_not: TAKEN_BACK.to_string() })
+    };
+    let earlier = history.questions.iter().flat_map(|q| &q.proposals).filter_map(taken_back);
+    let mut all: Vec<Rival> = Vec::new();
+    for rival in history.refused.iter().cloned().chain(earlier).filter(on_these) {
+        if !all.iter().any(|known| known.effect == rival.effect && known.joints == rival.joints) {
+            all.push(rival);
+        }
+    }
+    all
 }
 
 // Dependencies of a residual: the samples that it is worth, and the signals it depends on.

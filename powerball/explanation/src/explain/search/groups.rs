@@ -2,6 +2,7 @@
 //! accepted.
 
 use super::super::model::{Accepted, Model};
+use super::super::named::TAKEN_BACK;
 use super::super::study::Study;
 use super::cross_validation::CrossValidation;
 use super::evidence::{Evidence, Extent, Validation, evidence, refusal};
@@ -227,7 +228,7 @@ fn untested_refusal(
         return Some((why.to_string(), false));
     }
     if model.gave_up(candidate) {
-        return Some(("did not last, or could not be distinguished from its rivals".to_string(), true));
+        return Some((TAKEN_BACK.to_string(), true));
     }
     if let Some(name) = would_absorb(model, screen, member) {
         return Some((format!("gains too little to take the place of {name}"), true));
