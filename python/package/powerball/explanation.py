@@ -191,7 +191,7 @@ class Explained(OfLogs):
 
     @property
     def explainable(self) -> Array:
-        """The share of the squared error on the validation set that a smooth law would still take away, (n,)."""
+        """The share of the squared error on the validation set that a smooth law would take away."""
         return numbers(self._json["explainable"])
 
     @property

@@ -22,7 +22,7 @@ pub enum Settings {
     Constant,
     /// Half a wave: largest in the middle of the window.
     Push,
-    /// Of any shape: linear between [`KNOTS`] instants, the first and the last of which are the window's ends.
+    /// Of any shape: linear between five instants, the first and the last of which are the window's ends.
     Knots,
 }
 
