@@ -38,15 +38,7 @@ rpy = [0.4, "pi/3", "-pi/2"]
 "#;
 
 /// No joint turns.
-const GANTRY: &str = r#"
-name = "gantry"
-convention = "standard"
-gravity = [0, 0, -9.81]
-joint = [
-    { kind = "prismatic", a = 0, alpha = "pi/2", d = 0, theta = 0 },
-    { kind = "prismatic", a = 0, alpha = "pi/2", d = 0, theta = "pi/2" },
-]
-"#;
+const GANTRY: &str = include_str!("support/gantry.toml");
 
 /// An arm as it is generated.
 struct Case {

@@ -21,18 +21,19 @@ pub struct Load {
 
 /// Whose controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Form {
-    /// Franka: `endeffector-config.json` of an end effector.
+    /// Franka: endeffector-config.json of an end effector.
     Franka,
-    /// Universal Robots: a line of URScript.
+    /// Universal Robots: set_target_payload of URScript.
     Ur,
-    /// KUKA: load data in KRL.
+    /// KUKA: LOAD_DATA in KRL.
     Kuka,
-    /// Kinova: Kortex's `ToolConfiguration` as JSON.
+    /// Kinova: ToolConfiguration of Kortex as JSON.
     Kinova,
-    /// Doosan: the request of `config_create_tool` as YAML.
+    /// Doosan: the request of config_create_tool as YAML.
     Doosan,
-    /// UFACTORY: a line for the xArm Python SDK.
+    /// UFACTORY: set_tcp_load of the xArm Python SDK.
     Xarm,
 }
 

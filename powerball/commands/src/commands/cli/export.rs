@@ -2,7 +2,7 @@
 
 use super::{Failure, output};
 use crate::report::load::{Form, Load};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use std::path::PathBuf;
 
 /// Write the load that `explain` or `compare` found in the form of a robot's controller.
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 pub(crate) struct Export {
     /// Whose form.
     #[arg(long = "for", value_enum, value_name = "CONTROLLER")]
-    form: Controller,
+    form: Form,
     /// The result.
     #[arg(value_name = "RESULT.json")]
     result: PathBuf,
@@ -26,42 +26,12 @@ pub(crate) struct Export {
     json: bool,
 }
 
-/// The forms, as the command names them.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Controller {
-    /// Franka: endeffector-config.json of an end effector.
-    Franka,
-    /// Universal Robots: set_target_payload of URScript.
-    Ur,
-    /// KUKA: LOAD_DATA in KRL.
-    Kuka,
-    /// Kinova: ToolConfiguration of Kortex as JSON.
-    Kinova,
-    /// Doosan: the request of config_create_tool as YAML.
-    Doosan,
-    /// UFACTORY: set_tcp_load of the xArm Python SDK.
-    Xarm,
-}
-
-impl From<Controller> for Form {
-    fn from(controller: Controller) -> Form {
-        match controller {
-            Controller::Franka => Form::Franka,
-            Controller::Ur => Form::Ur,
-            Controller::Kuka => Form::Kuka,
-            Controller::Kinova => Form::Kinova,
-            Controller::Doosan => Form::Doosan,
-            Controller::Xarm => Form::Xarm,
-        }
-    }
-}
-
 impl Export {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let placed = |reason: String| format!("{}: {reason}", self.result.display());
         let text = dyngen::file::text(&self.result).map_err(|e| Failure::Unusable(placed(e.to_string())))?;
         let load = Load::of_result(&text).map_err(|e| Failure::Refused(placed(e)))?;
-        let exported = load.export(self.form.into()).map_err(|e| Failure::Refused(placed(e)))?;
+        let exported = load.export(self.form).map_err(|e| Failure::Refused(placed(e)))?;
         output::write_file(&self.output, exported.text.as_bytes())?;
         if self.json {
             let what = serde_json::json!({"file": self.output, "notes": exported.notes});
