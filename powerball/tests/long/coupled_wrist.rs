@@ -4,10 +4,6 @@
 //! The logs are the virtual arm's, whose Newton–Euler recursion and friction on motors share no formula with what is
 //! tested.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod generated;
-
 use chacha20::ChaCha8Rng;
 use dyngen::Arm;
 use powerball::controller::JointNumber;
@@ -29,7 +25,7 @@ use std::path::Path;
 /// The LWA 4P, its wrist a differential.
 fn arm() -> Arm {
     let block = "\n[[transmission]]\njoints = [5, 6]\nmatrix = [[1, 1], [1, -1]]\n";
-    let mut arm = Arm::parse(&(include_str!("../lwa4p.toml").to_string() + block), "wrist.toml").unwrap();
+    let mut arm = Arm::parse(&(include_str!("../../lwa4p.toml").to_string() + block), "wrist.toml").unwrap();
     arm.groupings.clear();
     arm
 }
@@ -132,7 +128,7 @@ fn the_controllers_torques_are_those_of_the_joints() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("coupled_wrist");
     std::fs::create_dir_all(&folder).unwrap();
     std::fs::write(folder.join("controller.rs"), model.source(&arm, Scalar::F64, &[]).unwrap()).unwrap();
-    let program = generated::controller(&folder);
+    let program = crate::generated::controller(&folder);
 
     let motion = motion(&plant, 9);
     let truth = plant.record(&motion, 0.0, 9);
@@ -147,7 +143,7 @@ fn the_controllers_torques_are_those_of_the_joints() {
         writeln!(input, "0").unwrap();
         expected.push(&truth.tau[6 * k..6 * (k + 1)]);
     }
-    let torques = generated::run(&program, input);
+    let torques = crate::generated::run(&program, input);
     assert_eq!(torques.len(), expected.len());
     for j in 0..6 {
         let rms = |of: &dyn Fn(usize) -> f64| {

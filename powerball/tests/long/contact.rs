@@ -1,8 +1,6 @@
 //! How soon `follow --stop-at-contact` sees a push on the virtual arm, over the bus at 200 Hz, and how often it is wrong; with a
 //! constant threshold for comparison. The study of docs/control.md is the ignored test.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
 use chacha20::ChaCha8Rng;
 use dyngen::{Arm, SetKind};
 use nalgebra::{SVector, Vector3};

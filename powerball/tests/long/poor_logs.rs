@@ -1,8 +1,6 @@
 //! Logs that cannot show what they are asked for: what `identify` and `explain` report about them, and how
 //! they end.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
 use powerball::commands::demo::Session;
 use serde_json::Value;
 use std::path::{Path, PathBuf};

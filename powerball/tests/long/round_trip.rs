@@ -1,10 +1,6 @@
 //! Excite, record, identify, explain, generate: the controller's torque is the report's.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod generated;
-
-use generated::{controller, run};
+use crate::generated::{controller, run};
 use powerball::commands::demo::Session;
 use powerball::explanation::{ExplainOptions, Explained, explain_body};
 use powerball::logs::log::{Log, common_clock, read_logs};

@@ -1,8 +1,6 @@
 //! `summarize`, `identify` and `verify` on logs of an arm whose base was mounted in two ways, as a user runs
 //! them.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
 use powerball::identification::excite::{Fourier, Harmonics};
 use powerball::identification::mounting::Mounting;
 use powerball::virtual_arm::lwa4p;
