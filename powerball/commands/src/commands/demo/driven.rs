@@ -89,10 +89,9 @@ pub(super) fn drive(
         stable.map_err(|why| DemoError::Drive(format!("by the {name} model {why}")))?;
     }
     let guard = model_arm::torque_guard(&explained);
-    let mut tracks = Vec::new();
-    for (name, (model, parts)) in
-        ["base", "explained"].into_iter().zip([&base, &explained].into_iter().zip(&parts_of_both))
-    {
+    // Two arms that do not know each other: they move at the same time.
+    let models = [("base", &base, &parts_of_both[0]), ("explained", &explained, &parts_of_both[1])];
+    let tracks = powerball_logs::parallel::map(&models, |&(name, model, parts)| {
         let setup = session.undeclared.setup(path.start().into(), seed).map_err(SessionError::Arm)?;
         let plant = VirtualArm::new(lwa4p::with_current_mode(setup)).ok_or_else(|| {
             SessionError::Arm(Diagnostics::whole_file("lwa4p.toml", "six joints are needed"))
@@ -113,8 +112,9 @@ pub(super) fn drive(
         let (_, track, _) = run
             .follow(on_bus, Envelope::new(|_| None), None, |_, _| ())
             .map_err(|e| DemoError::Drive(format!("with the {name} model {e}")))?;
-        tracks.push((name, track));
-    }
+        Ok((name, track))
+    });
+    let tracks = tracks.into_iter().collect::<Result<Vec<_>, DemoError>>()?;
     let followed = Followed::of(&arm.name, &law, &path, &tracks);
     Ok(Driven { followed, tracks, path })
 }

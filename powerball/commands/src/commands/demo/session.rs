@@ -131,17 +131,19 @@ impl Session {
         save(&arm_file, lwa4p::ARM_FILE)?;
         let model = Model::derive(lwa4p::arm()?).map_err(excite::Error::Model)?;
 
-        let mut found = Vec::new();
-        for (k, (_, period)) in PATHS.iter().enumerate() {
-            let settings = Settings {
+        let settings: Vec<Settings> = (PATHS.iter().enumerate())
+            .map(|(k, (_, period))| Settings {
                 harmonics: 5,
                 fundamental: TAU / period,
                 evaluations: EVALUATIONS,
                 seed: seed.wrapping_mul(PATHS.len() as u64).wrapping_add(k as u64 + (attempt << 48)),
                 ..Settings::default()
-            };
-            found.push(excite::optimise(&model, SetKind::Minimal, &settings)?);
-        }
+            })
+            .collect();
+        let found = powerball_logs::parallel::map(&settings, |settings| {
+            excite::optimise(&model, SetKind::Minimal, settings)
+        });
+        let found = found.into_iter().collect::<Result<Vec<_>, _>>()?;
 
         let plant = lwa4p::plant()?;
         let motions: Vec<Motion> =
