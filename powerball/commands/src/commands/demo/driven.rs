@@ -89,7 +89,7 @@ pub(super) fn drive(
         stable.map_err(|why| DemoError::Drive(format!("by the {name} model {why}")))?;
     }
     let guard = model_arm::torque_guard(&explained);
-    // Two arms that do not know each other: they move at the same time.
+    // The two runs are independent.
     let models = [("base", &base, &parts_of_both[0]), ("explained", &explained, &parts_of_both[1])];
     let tracks = powerball_logs::parallel::map(&models, |&(name, model, parts)| {
         let setup = session.undeclared.setup(path.start().into(), seed).map_err(SessionError::Arm)?;
