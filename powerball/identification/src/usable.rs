@@ -32,8 +32,11 @@ impl Findings<'_> {
     #[must_use]
     pub fn reasons(&self) -> Vec<String> {
         let mut reasons: Vec<String> = Vec::new();
-        if self.columns.is_some_and(Conventions::differ) {
-            reasons.push("the columns or the arm file are not what they are declared to be".to_string());
+        if let Some(wrong) = self.columns.filter(|columns| columns.differ()).map(Conventions::wrong) {
+            reasons.push(format!(
+                "the columns or the arm file are not what they are declared to be: {}",
+                wrong.trim_end_matches('.')
+            ));
         }
         reasons.extend(self.doubts.iter().cloned());
         if self.not_finite {

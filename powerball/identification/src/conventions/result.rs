@@ -164,11 +164,17 @@ impl Conventions {
         (!list.is_empty()).then(|| format!("one rigid arm with textbook friction leaves {}", list.join(", ")))
     }
 
+    /// What is surely wrong with the columns or the arm file, a sentence each; empty where nothing is.
+    #[must_use]
+    pub fn wrong(&self) -> String {
+        let wrong = self.answers.iter().filter(|answer| answer.as_said == Some(false));
+        wrong.map(|answer| answer.sentence.as_str()).collect::<Vec<_>>().join(" ")
+    }
+
     /// The line that comes first: what is wrong with the columns or the arm file, or that they are as they should be.
     #[must_use]
     pub fn verdict(&self) -> String {
-        let wrong: Vec<&str> =
-            (self.answers.iter()).filter(|a| a.as_said == Some(false)).map(|a| a.sentence.as_str()).collect();
+        let wrong = self.wrong();
         let left = self.joints_with_much_left();
         if !wrong.is_empty() {
             let suggested_map = self.suggested_map.as_ref().map_or(String::new(), |suggested_map| {
@@ -180,7 +186,7 @@ impl Conventions {
                 (None, _) => "The columns are not what they are declared to be.",
             };
             let left = left.map_or(String::new(), |left| format!(" Even so {left}."));
-            return format!("{what} {}{left} Nothing was changed.{suggested_map}", wrong.join(" "));
+            return format!("{what} {wrong}{left} Nothing was changed.{suggested_map}");
         }
         let open: Vec<&str> =
             self.answers.iter().filter(|a| a.as_said.is_none()).map(|a| a.question).collect();

@@ -121,10 +121,7 @@ const SUSPECT: f64 = 0.3;
 /// What speaks against the columns of a mounting's logs, in words.
 fn wrong_columns(mounted: &Mounted) -> Option<String> {
     let asked = conventions(&mounted.body, &mounted.logs, &mounted.held_out);
-    let against = asked.answers.iter().filter(|answer| answer.as_said == Some(false));
-    let sentences: Vec<&str> = against.map(|answer| answer.sentence.as_str()).collect();
-    let said = format!("the logs with the base {}: {}", mounted.mounting, sentences.join(" "));
-    (!sentences.is_empty()).then_some(said)
+    asked.differ().then(|| format!("the logs with the base {}: {}", mounted.mounting, asked.wrong()))
 }
 
 /// Several mountings: what the common parameters leave of each, and which logs contradict the others.

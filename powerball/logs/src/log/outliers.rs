@@ -40,14 +40,20 @@ pub(super) fn leave_out(
             (format!("q{}", j + 1), &raw.q[j], positions),
             (format!("{name}{}", j + 1), &raw.effort[j], torques),
         ] {
+            let Some(first) = found.first() else { continue };
             let is_rare = found.len() <= FEW || found.len() as f64 <= MOST * raw.t.len() as f64;
-            let Some(first) = found.first().filter(|_| is_rare) else { continue };
+            let what = match is_rare {
+                true => "left out",
+                false => {
+                    "too many to be left out; if they are spikes, identify with --estimator robust, which gives them less weight"
+                }
+            };
             let more = match found.len() {
                 1 => String::new(),
                 several => format!(" ({several} such samples, the first is this one)"),
             };
             let message = format!(
-                "at {:.3} s: {:.4e} cannot be where the other samples are right{more}: left out",
+                "at {:.3} s: {:.4e} cannot be where the other samples are right{more}: {what}",
                 raw.t[*first], values[*first]
             );
             findings.push(Finding {
@@ -56,7 +62,7 @@ pub(super) fn leave_out(
                 quantity,
                 message,
             });
-            found.iter().for_each(|k| keep[*k] = false);
+            found.iter().filter(|_| is_rare).for_each(|k| keep[*k] = false);
         }
     }
     if keep.contains(&false) {

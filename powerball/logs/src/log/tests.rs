@@ -591,6 +591,17 @@ fn a_number_that_cannot_be_is_named_and_left_out() {
         assert_eq!(said.line, Some(122));
         assert!(said.message.contains("cannot be") && said.message.ends_with("left out"), "{said}");
     }
+    // Six of a thousand are no rare fault: they stay, and the estimator that tolerates them is named.
+    let mut spikes = format!("{HEADER}\n");
+    for k in 0..1000 {
+        let t = 0.01 * f64::from(k);
+        let torque = if k % 180 == 90 { 1e9 } else { t.sin() };
+        spikes.push_str(&format!("{t},{},{},{torque},{}\n", (2.0 * t).sin(), (3.0 * t).cos(), t.cos()));
+    }
+    let (log, findings) = read(&spikes);
+    assert_eq!(log.unwrap().t.len(), 1000);
+    let said = findings.iter().find(|f| f.quantity == "tau1").unwrap();
+    assert!(said.message.contains("(6 such samples") && said.message.contains("--estimator robust"), "{said}");
     // A wrap of the angle and back is no fault, and neither is a knock.
     let sound = |k: usize, mut f: Vec<String>| {
         if k == 120 {

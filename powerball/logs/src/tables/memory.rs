@@ -18,11 +18,21 @@ pub fn allow_memory(bytes: u64) {
     ALLOWED.store(bytes, Ordering::Relaxed);
 }
 
-/// What is free, bytes, where the system tells it.
+/// What is free, bytes, where the system reports it: of the machine, and of the container where it has a limit.
 fn free() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    Some(1024 * line.trim().trim_end_matches(" kB").parse::<u64>().ok()?)
+    let machine = 1024 * line.trim().trim_end_matches(" kB").parse::<u64>().ok()?;
+    Some(container().map_or(machine, |container| container.min(machine)))
+}
+
+/// What is free below the memory limit of this process's container (cgroup v2), bytes; `None` without a limit.
+fn container() -> Option<u64> {
+    let bytes = |file: &str| {
+        let text = std::fs::read_to_string(format!("/sys/fs/cgroup/{file}")).ok()?;
+        text.trim().parse::<u64>().ok()
+    };
+    Some(bytes("memory.max")?.saturating_sub(bytes("memory.current")?))
 }
 
 /// What is left of the memory for one log.
