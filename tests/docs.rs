@@ -1,4 +1,4 @@
-//! What the pages name is there: files, folders and links.
+//! What the pages name is there: files, folders and links. And their words are the field's.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -83,6 +83,46 @@ fn the_architecture_names_every_folder_of_the_sources() {
             }
         }
     }
+}
+
+/// Words of a private vocabulary, each with what to write in its place.
+const PLAIN: &str = "told: reported; beside: next to; bears: tolerates; errs: is off by; begun: started; \
+    mend: correct; mended: corrected; dearest: longest; is said: is reported; are said: are reported; \
+    not said: not reported; so many: the number; asks of: requires of; asked of: required of; \
+    of others: other; hang together: depend on each other; held against: compared with; \
+    looked at as: checked as; broken off: interrupted; the least with which: the smallest; \
+    nobody builds what: each module is a feature; takes it as it is: exits with 0 anyway";
+
+#[test]
+fn pages_and_help_are_in_plain_words() {
+    let read = |name: &str| std::fs::read_to_string(root().join(name)).unwrap();
+    let mut texts = vec![("CHANGELOG.md".into(), read("CHANGELOG.md").split("\n## ").take(2).collect())];
+    let pages = pages().into_iter().filter(|page| !page.contains('/')).map(|page| format!("docs/{page}"));
+    for page in ["README.md", "KNOWN_GAPS.md"].map(String::from).into_iter().chain(pages) {
+        texts.push((page.clone(), read(&page).split("```").step_by(2).collect::<String>()));
+    }
+    let commands = "powerball/commands/src/commands/cli";
+    for folder in [commands, &format!("{commands}/bus"), "dyngen/src/cli"] {
+        for entry in std::fs::read_dir(root().join(folder)).unwrap() {
+            let file = format!("{folder}/{}", entry.unwrap().file_name().to_string_lossy());
+            if file.ends_with(".rs") {
+                let help = read(&file).lines().filter_map(|line| line.trim().strip_prefix("///")).collect();
+                texts.push((file, help));
+            }
+        }
+    }
+    let mut wrong = Vec::new();
+    for (name, text) in &texts {
+        // A mark of code is part of its word, so that keys of a file format are none of these words.
+        let words = text.split(|c: char| !c.is_alphanumeric() && c != '`').filter(|word| !word.is_empty());
+        let words = format!(" {} ", words.collect::<Vec<_>>().join(" ").to_lowercase());
+        for (word, better) in PLAIN.split("; ").map(|pair| pair.split_once(": ").unwrap()) {
+            if words.contains(&format!(" {word} ")) {
+                wrong.push(format!("{name}: \"{word}\"; write \"{better}\""));
+            }
+        }
+    }
+    assert!(texts.len() > 40 && wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 /// Python's `Rule` is written from the one of Rust: the same fields, words and defaults. With `POWERBALL_BLESS` set it is

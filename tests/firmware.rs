@@ -212,7 +212,7 @@ fn table_of_cycle(costs: &Costs) -> String {
     for (name, words) in [
         ("control", "trigonometry, torque with friction and three effects, impedance, limits, observer"),
         ("row", "a row of the test whether the model holds: six joints and the alarm"),
-        ("step", "the dearest cycle, in which two of the six joints have their turn of that row"),
+        ("step", "the longest cycle, in which two of the six joints have their turn of that row"),
     ] {
         let [_, stack, instructions] = costs[&format!("cycle {name}")];
         let _ = writeln!(text, "| {words} | {stack} | {instructions} |");

@@ -27,7 +27,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 struct Cli {
     #[command(subcommand)]
     command: Command,
-    /// End with 0 instead of 3 where the arm file is of no arm, such as links in millimetres.
+    /// Exit with 0 instead of 3 if the arm file cannot be an arm, such as links in millimetres.
     #[arg(long, global = true)]
     accept: bool,
 }

@@ -13,20 +13,21 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Compare two fits: which parameters and friction curves truly differ, what that means in torque, and why.
+/// Compare two fits: which parameters and friction curves differ significantly, the difference in torque, and
+/// why.
 ///
-/// Writes comparison.json and report.html. Intervals hold all at once: equal arms are called different in the
-/// share of comparisons that --level says. Differences are B less A.
+/// Writes comparison.json and report.html. All intervals hold at once: --level is the share of comparisons in
+/// which equal arms are called different. Differences are B − A.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  powerball compare monday/ friday/ --out compared\n  powerball compare \
         unit_1.csv \
         unit_2.csv --arm arm.toml --out compared")]
 pub(crate) struct Compare {
-    /// The one: the folder of a result of `powerball identify` or its identified.json; or, with --arm, a log
-    /// or a summary.
+    /// The first: the folder of a result of `powerball identify` or its identified.json; or, with --arm, a
+    /// log or a summary.
     #[arg(value_name = "A")]
     a: PathBuf,
-    /// The other.
+    /// The second.
     #[arg(value_name = "B")]
     b: PathBuf,
     /// The arm file (TOML), where A or B is a log or a summary.
@@ -34,7 +35,7 @@ pub(crate) struct Compare {
     arm: Option<PathBuf>,
     #[command(flatten)]
     map: MapArgument,
-    /// In which share of comparisons equal arms may be called different.
+    /// Share of comparisons in which equal arms may be called different.
     #[arg(long, default_value_t = 0.01)]
     level: f64,
     /// Folder for the results; made if missing.

@@ -58,9 +58,9 @@ pub(super) fn floor(text: &str) -> Result<FloorAt, String> {
 
 /// Search exciting trajectories (Eq. 17 to 20) within the arm's limits and surroundings, and write them.
 ///
-/// Kept are the file's limits of position, velocity, acceleration and torque, the floor, and the distance of
-/// the arm's links from each other, as capsules along its geometry. What had to be assumed for that is
-/// reported.
+/// The path keeps the file's limits of position, velocity, acceleration and torque, the floor, and the
+/// distance of the arm's links from each other, as capsules along its geometry. What had to be assumed for
+/// that is reported.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Examples:\n  powerball excite --arm arm.toml --out path.csv --period 10 --harmonics 5 \
@@ -120,7 +120,7 @@ pub(crate) struct Excite {
     /// Distance that capsules keep from each other and from the floor, m.
     #[arg(long, default_value_t = CLEARANCE, allow_hyphen_values = true)]
     clearance: f64,
-    /// Looks neither at the floor nor at links that touch.
+    /// Ignore the floor and links that touch.
     #[arg(long)]
     no_collision: bool,
     /// The arm's masses for the torque limits: an identified.json, or a values file `{"parameter": number,
@@ -128,7 +128,7 @@ pub(crate) struct Excite {
     /// are guessed from the capsules.
     #[arg(long, value_name = "FILE.json", conflicts_with = "no_torque")]
     values: Option<PathBuf>,
-    /// Does not look at torque limits.
+    /// Ignore torque limits.
     #[arg(long)]
     no_torque: bool,
     /// The pose before the trajectory, rad with commas between: the straight way from there to its beginning

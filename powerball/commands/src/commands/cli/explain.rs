@@ -50,8 +50,8 @@ pub(crate) struct Explain {
     /// Logs of another path, on which additions must hold.
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     validate: Vec<PathBuf>,
-    /// What is known already: model.json of an earlier `powerball explain` for the same arm file. It is taken
-    /// out of the logs as it stands; what is found comes to it.
+    /// What is known already: model.json of an earlier `powerball explain` for the same arm file. Its effects
+    /// are removed from the logs unchanged; what is found is added.
     #[arg(long, value_name = "FILE.json")]
     model: Option<PathBuf>,
     /// Where two names fit equally well, record the experiment that tells them apart, and explain again with

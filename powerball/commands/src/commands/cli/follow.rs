@@ -31,14 +31,15 @@ enum With {
     Impedance,
 }
 
-/// Follow a trajectory with a torque model and say how far off the arm was, by joint; with --compare also with a base model
-/// or with no model, one after the other.
+/// Follow a trajectory with a torque model and report the tracking error by joint; with --compare also with a
+/// base model or with no model, one after the other.
 ///
-/// Nothing of this was run on hardware by this project: try --bus virtual first. Writes follow.json, report.html, and log.csv
-/// with the columns of `powerball record`, a whole line a cycle, also where the arm is stopped: `identify` and `explain` read it.
-/// Before anything moves, the model is held against the arm file, the gains against the cycle (largest pole of the sampled
-/// loop over 300 poses), and the trajectory is looked at as `powerball record` does. Set-points, torque offsets and
-/// currents pass the driver's guards; Ctrl-C stops the arm. THE ARM MOVES.
+/// Nothing of this was run on hardware by this project: try --bus virtual first. Writes follow.json,
+/// report.html, and log.csv with the columns of `powerball record`, a whole line a cycle, also where the arm
+/// is stopped: `identify` and `explain` read it. Before anything moves, the model is compared with the arm
+/// file, the gains with the cycle (largest pole of the sampled loop over 300 poses), and the trajectory is
+/// checked as by `powerball record`. Set-points, torque offsets and currents pass the driver's guards; Ctrl-C
+/// stops the arm. THE ARM MOVES.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  powerball demo --effect spring --out demo\n  \
     powerball excite --arm demo/arm.toml --out path.csv\n  \
@@ -67,8 +68,8 @@ pub(crate) struct FollowCommand {
     /// Stop the arm where its external torque is more than the model's error can be, in current mode: something touches it.
     #[arg(long)]
     stop_at_contact: bool,
-    /// How far a push may take a joint off its path in current mode before the arm is stopped, rad, 0 to 0.5, next to what gains
-    /// and model explain. For --with impedance, where somebody is to push the arm.
+    /// How far a push may take a joint off its path in current mode before the arm is stopped, rad, 0 to 0.5,
+    /// in addition to what gains and model explain. For --with impedance, where somebody is to push the arm.
     #[arg(long, value_name = "RAD", default_value_t = 0.0, allow_negative_numbers = true)]
     give: f64,
     /// Time that the arm has been working, s: 3600 counts as warm. For models with a temperature effect.

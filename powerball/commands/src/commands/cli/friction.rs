@@ -22,9 +22,9 @@ use std::path::PathBuf;
 /// Move each joint at 18 constant velocities each way where gravity does not load it, and fit friction laws (Eq.
 /// 15, Eq. 16, Stribeck).
 ///
-/// Writes friction_K.csv for each joint as it is recorded, friction.json and report.html. A run that was
-/// broken off goes on with the joint that it was at. Joints that need another mounting of the base are named;
-/// the virtual arm is mounted as they need it. THE ARM MOVES.
+/// Writes friction_K.csv for each joint as it is recorded, friction.json and report.html. An interrupted run
+/// continues with its joint. Joints that need another mounting of the base are named; the virtual arm is
+/// mounted as they need it. THE ARM MOVES.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  powerball friction --out friction\n  \
     powerball friction --bus socketcan:can0 --mounting 0,90 --joints 2,3 --out friction")]

@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 /// Write a model with its effects as one Rust file for a controller: no std, no allocation, needs nalgebra
 /// alone.
 ///
-/// `TorqueModel::torque` in it is the torque that the report of the model is of: rigid arm, friction and
-/// every effect. The rigid dynamics are proven equal to the Lagrangian before they are written.
+/// `TorqueModel::torque` in it is the torque of the report: rigid arm, friction and every effect. The rigid
+/// dynamics are proven equal to the Lagrangian before they are written.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Example:\n  powerball generate --arm arm.toml --model result/model.json -o controller.rs \

@@ -22,8 +22,8 @@ use std::path::{Path, PathBuf};
 /// part, Eq. 16) to logs.
 ///
 /// Writes identified.json and report.html; consistent.json: the nearest parameters that a real arm can have,
-/// as values for `dyngen generate --values`; covariance.json: how well all of it is known together, for
-/// `powerball compare`.
+/// as values for `dyngen generate --values`; covariance.json: the covariance of all of it, for `powerball
+/// compare`.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Examples:\n  powerball identify --arm arm.toml --log a.csv b.csv --validate c.csv --out \
@@ -82,8 +82,8 @@ enum EstimatorName {
     /// Least squares, every joint weighted by its noise.
     #[default]
     Weighted,
-    /// Weighted least squares in which torque samples that the model cannot believe (knocks, spikes, brief
-    /// collisions) count less or nothing.
+    /// Weighted least squares in which outliers of the torque (spikes, brief collisions) count less or
+    /// nothing.
     Robust,
     /// Instrumental variables: unbiased where positions are noisy. The regressor from every second sample of
     /// the positions, its instruments from those between.
@@ -152,9 +152,9 @@ fn in_words(identified: &Identified, verbose: bool, out: &Path) -> String {
 
 /// Find the nearest parameters that a real arm can have.
 ///
-/// Values of any parameter set (a paper's, or those of identified.json) need not be a body's. Of all real
-/// arms the one is found whose torques come nearest to theirs, over states within the arm's limits. Writes
-/// its parameters as values for `dyngen generate --values`, and says how far they are.
+/// Values of any parameter set (a paper's, or those of identified.json) can be impossible for a body. This
+/// finds the real arm whose torques are nearest to theirs, over states within the arm's limits. Writes its
+/// parameters as values for `dyngen generate --values`, and says how far they are.
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  powerball consistent --arm arm.toml --values table3.json --out \
         consistent.json\n  dyngen generate arm.toml -o arm.rs --values consistent.json")]

@@ -42,8 +42,8 @@ pub(crate) struct MapArgument {
     /// 'joints = ["a", "b"]', 'topic = "/joint_states"' or 'tau.sign = -1'. May be repeated.
     #[arg(long, value_name = "MAP.toml")]
     map: Vec<String>,
-    /// What one log may take in memory, such as 2GB or 500MB: a larger one is refused before it is read. Half of what is free
-    /// where it is left out.
+    /// Memory limit for one log, such as 2GB or 500MB: a larger log is refused before it is read. Default:
+    /// half of the free memory.
     #[arg(long, value_name = "SIZE", value_parser = size)]
     memory: Option<u64>,
 }

@@ -80,7 +80,7 @@ enum Command {
     Summarize(summarize::Summarize),
     /// Judge an identified model on logs that it has not seen.
     Verify(verify::Verify),
-    /// Compare two fits: what truly differs, what it means in torque, and why.
+    /// Compare two fits: what differs significantly, the difference in torque, and why.
     Compare(compare::Compare),
     /// Find, name and add what the model lacks on logs; judged on another path.
     Explain(explain::Explain),
@@ -88,7 +88,7 @@ enum Command {
     Generate(generate::Generate),
     /// Write a load that was found in the form of a robot's controller.
     Export(export::Export),
-    /// Say when a model no longer holds, along logs or a stream: since when, on which joints and why.
+    /// Report when a model no longer holds, along logs or a stream: since when, on which joints and why.
     Watch(watch::WatchCommand),
     /// Print what completes this program's words in a shell.
     Completions(shell::Completions),

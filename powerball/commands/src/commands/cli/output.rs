@@ -172,8 +172,8 @@ pub(crate) fn notes(count: usize) -> Option<String> {
 /// Whether a result that should not be used is taken nevertheless.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct Accept {
-    /// End with 0 instead of 3 where the result should not be used: columns or arm file are not what they are
-    /// declared to be, a joint does not move or is predicted no better than by its mean (docs/exit_codes.md).
+    /// Exit with 0 instead of 3 if the result is unreliable: columns or arm file are not as declared, a joint
+    /// does not move or is predicted no better than by its mean (docs/exit_codes.md).
     #[arg(long)]
     accept: bool,
 }

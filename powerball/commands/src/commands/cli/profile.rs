@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 /// Make the bus driver's constant tables of an arm: a Rust file.
 ///
 /// The DCF (or EDS) is the drive maker's; the TOML says what it cannot know of the arm: nodes, rate, mapping,
-/// limits, scales. Counts in a degree that the TOML does not tell are taken from 0x608F, 0x6091 and 0x6092 of the DCF
-/// where they have values there; a mode that the TOML leaves out is not required of the drives.
+/// limits, scales. Without counts per degree in the TOML they are computed from 0x608F, 0x6091 and 0x6092 of
+/// the DCF; a mode that the TOML leaves out is not required of the drives.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  powerball profile --dcf Schunk_0_63.dcf --arm powerball/lwa4p_bus.toml \
         --constant LWA4P -o lwa4p.rs")]

@@ -21,11 +21,12 @@ use std::path::PathBuf;
 ///
 /// Each line is written whole: whatever happens, the log can be read up to there. A log whose name ends in
 /// .parquet or .mcap is written as lines next to it, NAME.parquet.csv, and becomes that when it ends; lines
-/// that a program left which died are put into NAME.interrupted-1.parquet by the next recording of that name.
+/// that an interrupted program left are moved to NAME.interrupted-1.parquet by the next recording of that
+/// name.
 ///
-/// Before the arm moves the trajectory is looked at as a whole, and so is the way to where it begins, each joint
-/// straight there from where the arm stands: limits of position, velocity, acceleration and torque, the floor, and
-/// the arm's links as capsules in the way of `powerball excite`. THE ARM MOVES.
+/// Before the arm moves the whole trajectory and the straight way to its beginning are checked: limits of
+/// position, velocity, acceleration and torque, the floor, and the arm's links as capsules in the way of
+/// `powerball excite`. THE ARM MOVES.
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  powerball excite --arm powerball/lwa4p.toml --out path.csv\n  \
     powerball record --trajectory path.csv --out log.csv --arm powerball/lwa4p.toml --floor -0.2 --bus \

@@ -16,9 +16,8 @@ use std::sync::Arc;
 /// Reduce logs to triangular factors, which `powerball identify` takes in place of the logs.
 ///
 /// A summary is of one size however long the logs were, and holds all that a fit needs of them: the rows of
-/// every joint for any friction steepness, octave by octave, in three bands. Summaries made one by one
-/// anywhere come to what their logs would have come to together. They are of one arm file; another one
-/// refuses them.
+/// every joint for any friction steepness, octave by octave, in three bands. Joined summaries give the result
+/// of all their logs. A summary belongs to one arm file and is refused with another.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Example:\n  powerball summarize --arm arm.toml --log a.csv --out a.summary\n  powerball \

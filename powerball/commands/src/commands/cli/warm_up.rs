@@ -15,13 +15,13 @@ use powerball_virtual_arm::{PlantEffect, VirtualArm, lwa4p};
 use std::fs::File;
 use std::path::PathBuf;
 
-/// Swing every joint until its mean torque over a cycle no longer changes (Fig. 3), and say when the arm is
-/// warm.
+/// Swing every joint until its mean torque over a cycle no longer changes (Fig. 3), and report when the arm
+/// is warm.
 ///
 /// Writes warm_up.csv, warm_up.json and report.html. The end is a test of the trend, not a fixed time: the
 /// arm is warm when, at 95 %, no joint's torque can still change by more than the tolerance. Exit code 1
-/// where that is not reached. A warm-up that was broken off, or that did not get warm, goes on with what its
-/// log shows, unless the arm had time to cool since. THE ARM MOVES.
+/// where that is not reached. An interrupted warm-up, or one that did not get warm, continues with its log,
+/// unless the arm had time to cool. THE ARM MOVES.
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  powerball warm-up --out warm --bus socketcan:can0")]
 pub(crate) struct WarmUp {

@@ -18,13 +18,13 @@ use powerball_logs::tables;
 use std::io::{BufRead, Read};
 use std::path::PathBuf;
 
-/// Say when the torque model no longer holds: since when, on which joints and why (a push, a payload, friction,
-/// a sensor's zero, a delay, or unknown).
+/// Report when the torque model no longer holds: since when, on which joints and why (a push, a payload,
+/// friction, a sensor's zero, a delay, or unknown).
 ///
-/// A line for each change, and a last one: `holds` or `changed`. The exit code is 0 where the model holds, 1 where
-/// something changed, 3 where that cannot be determined. It is a sequential test: at most one false alarm in
-/// `--hours` of motion on average, as long as the model's error is no larger than on the logs it was
-/// explained on and friction stays within `--friction-range`. Rows at rest say nothing and are not watched.
+/// A line for each change, and a last one: `holds` or `changed`. The exit code is 0 where the model holds, 1
+/// where something changed, 3 where that cannot be determined. It is a sequential test: at most one false
+/// alarm in `--hours` of motion on average, as long as the model's error is no larger than on the logs it was
+/// explained on and friction stays within `--friction-range`. Rows at rest are not watched.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Examples:\n  powerball watch --arm arm.toml --model result/model.json --log today.csv --json\n  \
@@ -40,7 +40,7 @@ pub(crate) struct WatchCommand {
     /// model.json of `powerball explain`, or identified.json, for the same arm file.
     #[arg(long, value_name = "FILE.json")]
     model: PathBuf,
-    /// Logs, each watched by itself (CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5).
+    /// Logs, each watched on its own (CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5).
     #[arg(long, value_name = "FILE", num_args = 1..)]
     log: Vec<PathBuf>,
     /// A bus on which another master moves the LWA 4P: socketcan:can0, slcan:/dev/ttyACM0 or udp:239.74.163.2:43113.
@@ -60,13 +60,13 @@ pub(crate) struct WatchCommand {
     /// One JSON object a line for each change; the last line goes to standard error.
     #[arg(long)]
     json: bool,
-    /// End with 0 where something changed: for pipes that stop at the first command that fails.
+    /// Exit with 0 even if something changed: for pipes that stop at the first command that fails.
     #[arg(long)]
     exit_zero: bool,
     /// Mean time between two false alarms, h of motion.
     #[arg(long, default_value_t = 24.0, value_parser = positive)]
     hours: f64,
-    /// By what share of itself friction may wander without an alarm.
+    /// Share of the friction by which it may change slowly without an alarm.
     #[arg(long, default_value_t = 0.02, value_parser = share)]
     friction_range: f64,
     /// Where the model file does not state the usual residual: this many seconds of motion are taken as good.

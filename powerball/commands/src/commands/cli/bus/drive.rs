@@ -40,7 +40,7 @@ pub(crate) struct Enable {
 
 /// Stop whatever the drives do: quick stop to all of them at once, then their brakes, then no torque.
 ///
-/// Needs no configuration and takes none away: an SDO to each drive, as for a program that died.
+/// Needs no configuration and changes none: an SDO to each drive, as for a program that died.
 #[derive(Args, Debug)]
 #[command(after_help = "Example: powerball bus stop --bus socketcan:can0")]
 pub(crate) struct Stop {
@@ -54,8 +54,8 @@ pub(crate) struct Stop {
 
 /// Move one joint slowly to a position, and let go again.
 ///
-/// As `enable`, and the joint goes to `--to` (or by `--by`) at `--speed` in interpolated position mode. Before the
-/// brakes open the way is looked at as `powerball record` does: limits, torque, floor, links.
+/// As `enable`, and the joint goes to `--to` (or by `--by`) at `--speed` in interpolated position mode.
+/// Before the brakes open the way is checked as by `powerball record`: limits, torque, floor, links.
 #[derive(Args, Debug)]
 #[command(after_help = "Example: powerball bus move --joint 6 --by 0.1 --speed 0.1 --bus socketcan:can0")]
 pub(crate) struct Move {
