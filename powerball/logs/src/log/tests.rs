@@ -601,7 +601,10 @@ fn a_number_that_cannot_be_is_named_and_left_out() {
     let (log, findings) = read(&spikes);
     assert_eq!(log.unwrap().t.len(), 1000);
     let said = findings.iter().find(|f| f.quantity == "tau1").unwrap();
-    assert!(said.message.contains("(6 such samples") && said.message.contains("--estimator robust"), "{said}");
+    assert!(
+        said.message.contains("(6 such samples") && said.message.contains("--estimator robust"),
+        "{said}"
+    );
     // A wrap of the angle and back is no fault, and neither is a knock.
     let sound = |k: usize, mut f: Vec<String>| {
         if k == 120 {
