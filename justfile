@@ -4,11 +4,11 @@
 default:
     @just --list
 
-# The tests of one room, a folder of powerball/. `just test bus sdo`: those named so.
-test ROOM *TESTS:
-    cargo test -p powerball-{{ROOM}} --all-features --locked -- {{TESTS}}
+# The tests of one module, a folder of powerball/. `just test bus sdo`: those whose name has sdo.
+test MODULE *TESTS:
+    cargo test -p powerball-{{MODULE}} --all-features --locked -- {{TESTS}}
 
-# What can be asked in minutes: formatting, spelling, licences, lints, each room alone.
+# Checks that take minutes: formatting, spelling, licences, lints, modules alone.
 fast:
     .ci/fast
 

@@ -1,21 +1,26 @@
-//! The runtime of a robot arm: friction and torque corrections on a controller, a CANopen driver, and the way
-//! from logs to a model that explains them.
+//! From a robot arm's logs to a torque model with everything that the rigid model lacks; the model on a controller; the
+//! arm on its CAN bus.
 //!
-//! The crate is a house of a few rooms, each a package of its own (`powerball-controller` and so on). A room uses the rooms
-//! above it in this list and never one below it; each has a feature here, so that nobody builds what he does not use.
+//! [`identify`] fits base parameters and friction to logs of positions and torques, with confidence intervals. [`explain`]
+//! finds the residual, names effects that cause it (payload, hysteresis, spring, delay, …), and checks each on a path that
+//! was not fitted. [`compare`] reports what differs between two fits. The arm comes from an arm file
+//! ([`dyngen::Arm`](https://docs.rs/dyngen)).
 //!
-//! | room | feature | `std` | who lives there |
+//! Each module is a package of its own (`powerball-controller` and so on) and a Cargo feature here: you build only what you
+//! use. A module uses those above it in this table, never one below it.
+//!
+//! | module | feature | `std` | contents |
 //! |---|---|---|---|
-//! | [`controller`] | always; `lwa4p` adds the LWA 4P's generated model | no | what runs in the control loop |
+//! | [`controller`] | always; `lwa4p` adds the LWA 4P's generated model | no | friction, effects and control laws in the control loop |
 //! | [`bus`] | `driver`; `bus` adds the ways to a bus | no; yes | CANopen, CiA 402, the arm's driver |
 //! | [`logs`] | `identify` | yes | log files, signals, rows of the regression, summaries |
 //! | [`identification`] | `identify` | yes | from rows to parameters, and the paths that excite them |
-//! | [`comparison`] | `identify` | yes | two fits side by side: what truly differs |
-//! | [`explanation`] | `explain` | yes | from what a model leaves to named effects, and to the model with them |
-//! | [`virtual_arm`] | `virtual-arm` | yes | an arm to try all of it on |
+//! | [`comparison`] | `identify` | yes | two fits compared: which differences are significant |
+//! | [`explanation`] | `explain` | yes | from the residual to named effects, and the model with them |
+//! | [`virtual_arm`] | `virtual-arm` | yes | a simulated arm on a bus |
 //! | [`procedure`] | `procedure` | yes | the paper's steps on a bus |
 //! | [`report`] | `report` | yes | pages and figures of results |
-//! | [`commands`] | `cli` | yes | the `powerball` command, its pages, the demo |
+//! | [`commands`] | `cli` | yes | the `powerball` command, the demo |
 //!
 //! "The paper" is *Modeling and dynamic parameter identification of the SCHUNK Powerball robotic arm*;
 //! equations and tables that are cited by number are its own.
