@@ -156,6 +156,7 @@ fn check_signals(
         unwrap(&mut raw.q[j], &raw.line, &raw.t, j, arm, file, findings);
         units(raw, j, effort, arm, file, findings, &mut errors);
     }
+    let mut errors = one_a_quantity(errors);
     let name = if matches!(effort, Effort::Torque) { "tau" } else { "i" };
     let mut warnings = Warnings { file, line: &raw.line, t: &raw.t, findings, errors: &mut errors };
     for (j, (q, effort)) in raw.q.iter().zip(&raw.effort).enumerate() {
@@ -278,6 +279,28 @@ fn unwrap(
             ),
         });
     }
+}
+
+/// Joints with the same mistake as one error: all their columns, and the first one's figures.
+fn one_a_quantity(errors: Vec<Finding>) -> Vec<Finding> {
+    let quantity = |name: &str| name.trim_end_matches(|c: char| c.is_ascii_digit()).to_string();
+    let mut merged: Vec<Finding> = Vec::new();
+    for error in errors {
+        let like = |other: &&mut Finding| {
+            let first = other.quantity.split(", ").next().unwrap_or_default();
+            quantity(first) == quantity(&error.quantity)
+        };
+        match merged.iter_mut().find(like) {
+            Some(first) => {
+                if !first.quantity.contains(", ") {
+                    first.message = format!("{} {}", first.quantity, first.message);
+                }
+                first.quantity = format!("{}, {}", first.quantity, error.quantity);
+            }
+            None => merged.push(error),
+        }
+    }
+    merged
 }
 
 /// Numbers that only another unit explains.

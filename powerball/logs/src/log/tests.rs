@@ -510,7 +510,13 @@ fn arrays_that_are_no_log_name_quantity_and_sample() {
     assert!(of(&q[..1], &torque).contains("missing: q2"));
     assert!(of(&q, &[]).contains("missing: tau1, tau2"));
     let degrees: Vec<Vec<f64>> = q.iter().map(|q| q.iter().map(|x| 900.0 * x).collect()).collect();
-    assert!(of(&degrees, &torque).contains("angles must be in radians"), "{}", of(&degrees, &torque));
+    // All joints in one line.
+    let said = of(&degrees, &torque);
+    assert!(
+        said.starts_with("run: q1, q2: q1 reaches") && said.contains("angles must be in radians"),
+        "{said}"
+    );
+    assert_eq!(said.lines().count(), 1, "{said}");
     let holes = vec![torque[0].iter().map(|_| f64::NAN).collect(), torque[1].clone()];
     assert!(of(&q, &holes).starts_with("run:1: tau1: 200 of 200 samples"), "{}", of(&q, &holes));
 }
