@@ -39,8 +39,8 @@ impl Possibility {
     pub fn warnings(&self, file: &Path) -> Vec<String> {
         let warning = |reason: &String| {
             format!(
-                "{}: no real arm can have these values: {reason}; the nearest that one can have: consistent.json of \
-                 `powerball identify`, or `powerball consistent`",
+                "{}: no real arm can have these values: {reason}; for the nearest possible values see \
+                    consistent.json of `powerball identify`, or run `powerball consistent`",
                 file.display()
             )
         };
@@ -220,8 +220,8 @@ fn why_no_body(v: &[f64; 10], smallest: f64) -> String {
     }
     if let Some((name, value, others)) = triangle.iter().find(|(_, value, others)| value > others) {
         return format!(
-            "{name} = {value} exceeds the sum {others} of the other two moments of inertia, which no body's \
-                does"
+            "{name} = {value} exceeds the sum {others} of the other two moments of inertia, which is \
+                impossible for a body"
         );
     }
     if v[0] == 0.0 {

@@ -13,7 +13,7 @@ pub fn regular(path: &Path) -> io::Result<()> {
     match kind.is_file() || kind.is_dir() {
         true => Ok(()),
         false => Err(io::Error::other(
-            "it is a pipe or a device, which need not end: write what it gives into a file and name that",
+            "it is a pipe or a device, which may never end: write its data to a file and give that file",
         )),
     }
 }

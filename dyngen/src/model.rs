@@ -74,8 +74,8 @@ impl fmt::Display for Error {
             ),
             Error::NeedsEveryParameter(function) => write!(
                 f,
-                "{function} depends on masses that no torque shows: ask for the set that has every parameter, \
-                 --parameters full"
+                "{function} depends on masses that affect no torque: choose the set that has every \
+                    parameter, --parameters full"
             ),
         }
     }

@@ -171,7 +171,7 @@ fn a_spring_is_the_joints_stiffness() {
     assert_eq!(of_lift(&new.text, "stiffness"), Some(20.0));
     let rest = of_lift(&new.text, "springref").unwrap();
     assert!((rest - 0.25f64.to_degrees()).abs() < 1e-12, "{rest}");
-    assert!(new.text.contains("spring: the motor has to bring up (20.0 ± 5.000e-1) q + (-5.0 ± 2.000e-1)"));
+    assert!(new.text.contains("spring: the motor must supply (20.0 ± 5.000e-1) q + (-5.0 ± 2.000e-1)"));
     assert!(new.text.contains("(0.5 ± 3.000e-2) cos(32 q) + (-0.25 ± 4.000e-2) sin(32 q)"), "{}", new.text);
     assert!(new.text.contains("(1.5, standard error unknown) within 0.02"));
     let pushing = exported(ARM, &MODEL.replace("\"coefficient\": 20", "\"coefficient\": -20"));

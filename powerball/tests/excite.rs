@@ -186,7 +186,7 @@ fn what_cannot_be_kept_is_said() {
     refused(&["--from", "0,0,0"], 2, "--from has 3 numbers, the arm 6 joints");
     refused(&["--radius", "0"], 2, "--radius must be above 0");
     refused(&["--clearance", "-1"], 2, "--clearance");
-    refused(&["--rate", "1e9"], 2, "are no trajectory");
+    refused(&["--rate", "1e9"], 2, "at most");
     refused(&["--mounting", "upright"], 2, "no mounting");
     refused(&["--values", "no/such.json"], 2, "no/such.json: cannot be read");
     let model = scratch("bad.json");

@@ -120,7 +120,7 @@ fn files_of_others_are_not_written_over() {
     // A log is never its own copy, and replaces no other.
     let to = "log a.csv --arm arm.toml --to csv -o";
     let refused = powerball(&folder, &format!("{to} a.csv --force"));
-    assert!(code(&refused) == 2 && said(&refused).contains("is what is read"), "{}", said(&refused));
+    assert!(code(&refused) == 2 && said(&refused).contains("is also an input"), "{}", said(&refused));
     kept("a.csv", &log);
     std::fs::write(folder.join("b.csv"), "t,q1,tau1\n0,0,0\n").unwrap();
     assert_eq!(code(&powerball(&folder, &format!("{to} b.csv"))), 2);

@@ -278,7 +278,7 @@ fn an_sqlite_file_that_is_torn_or_no_bag_says_so() {
             other[at..at + 8].copy_from_slice(b"massages");
         }
     }
-    assert!(error(&other).contains("without the table messages is no rosbag2"), "{}", error(&other));
+    assert!(error(&other).contains("without the table messages is not a rosbag2"), "{}", error(&other));
 }
 
 // Messages by the definition that stands in their file.

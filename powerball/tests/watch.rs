@@ -173,7 +173,7 @@ fn what_cannot_be_watched_is_said_before_anything_is_computed() {
         (vec!["--model", &model, "--log", &few], None, "missing: q2"),
         (vec!["--model", &model, "-"], Some("t,q1,q2,i1,i2\n0,0,0,0,0\n"), "no torque_constant"),
         (vec!["--model", &model, "-"], Some("t,q1,q2,tau1,tau2\n0,0,0,0,0\n"), "at least 40 are needed"),
-        (vec!["--model", &model, "-"], Some("{\"t\": 0,\n"), "line 1: is no JSON object"),
+        (vec!["--model", &model, "-"], Some("{\"t\": 0,\n"), "line 1: is not a JSON object"),
         (vec!["--model", &model, "--bus", "virtual"], None, "the arm file has 2 joints"),
         (vec!["--model", &model], None, "required"),
         (vec!["--model", &model, "--log", &log, "--friction-range", "2"], None, "give a share"),

@@ -285,7 +285,7 @@ mod tests {
 
     #[test]
     fn a_caller_that_is_away_finds_the_arm_stopped_or_going_on() {
-        assert!(Arm::open("nowhere").unwrap_err().contains("names no bus"));
+        assert!(Arm::open("nowhere").unwrap_err().contains("is not a bus"));
         let mut arm = Arm::open("virtual").unwrap();
         assert!(arm.activate().is_err());
         assert!(arm.write(&[0.0; JOINTS]).is_err());

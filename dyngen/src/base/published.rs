@@ -103,7 +103,7 @@ fn lost(
             continue;
         }
         let reason = if replacement.is_empty() {
-            format!("{parameter} moves the torque, but no sum holds it")
+            format!("{parameter} changes the torque, but is in no sum")
         } else {
             let instead = combination_text(field, &replacement);
             let ratio = arm.joints[parameter.link].rotor_ratio.as_ref();
@@ -115,7 +115,7 @@ fn lost(
                 ),
                 _ => String::new(),
             };
-            format!("the sums replace {parameter} by {instead}, which moves the torque differently{rotor}")
+            format!("the sums replace {parameter} by {instead}, which changes the torque differently{rotor}")
         };
         lost.push((parameter, reason));
     }

@@ -73,7 +73,7 @@ impl Angle {
         let compact: String = text.chars().filter(|c| !c.is_whitespace()).collect();
         let wrong = || {
             format!(
-                "'{text}' is no angle: write a number of radians, or a rational multiple of pi such as \
+                "'{text}' is not an angle: write a number of radians, or a rational multiple of pi such as \
                  \"pi/2\", \"-pi/2\" or \"3*pi/4\""
             )
         };

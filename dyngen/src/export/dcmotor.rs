@@ -65,7 +65,9 @@ pub(super) fn motors(kind: JointKind, friction: Option<Friction>, terms: &[&Term
                     all.motors.push(cogging(effect, *order, terms));
                 }
             }
-            Law::Presliding { .. } if c <= 0.0 => left_out("a negative level, which no bristles have"),
+            Law::Presliding { .. } if c <= 0.0 => {
+                left_out("a negative level, which is impossible for bristles")
+            }
             Law::Presliding { distance } => all.motors.push(Motor {
                 attributes: lugre(c / distance, c, c, 1.0),
                 words: format!(
@@ -78,7 +80,7 @@ pub(super) fn motors(kind: JointKind, friction: Option<Friction>, terms: &[&Term
             Law::Stribeck { velocity } => {
                 let coulomb = friction.map_or(0.0, |friction| friction.coulomb);
                 if coulomb <= 0.0 || coulomb + c <= 0.0 {
-                    left_out("LuGre's friction has it beside constant friction only");
+                    left_out("LuGre's friction has it only together with constant friction");
                 } else if all.has_coulomb {
                     left_out("LuGre's friction has one velocity");
                 } else {
@@ -98,8 +100,8 @@ pub(super) fn motors(kind: JointKind, friction: Option<Friction>, terms: &[&Term
                     });
                 }
             }
-            Law::Position => left_out("a torque that falls with the position, which no spring's does"),
-            Law::Constant => left_out("MuJoCo has no constant torque that is no actuator's"),
+            Law::Position => left_out("a torque that falls with the position, which is not a spring"),
+            Law::Constant => left_out("MuJoCo has no constant torque without an actuator"),
             Law::Other(law) => left_out(&format!("MuJoCo has no law '{law}'")),
         }
     }
@@ -123,7 +125,7 @@ fn spring(terms: &[&Term]) -> Option<Spring> {
         stiffness,
         rest: -offset / stiffness,
         words: format!(
-            "{}: the motor has to bring up {} q + {}, exactly",
+            "{}: the motor must supply {} q + {}, exactly",
             grows[0].effect,
             with_error(&grows),
             with_error(&constant)
@@ -164,7 +166,7 @@ fn cogging(effect: &str, order: f64, terms: &[&Term]) -> Motor {
     Motor {
         attributes: format!("gear=\"{gear}\" cogging=\"{amplitude} {poles} {phase}\""),
         words: format!(
-            "{effect}: the motor has to bring up {} cos({order} q) + {} sin({order} q), exactly",
+            "{effect}: the motor must supply {} cos({order} q) + {} sin({order} q), exactly",
             with_error(&cosines),
             with_error(&sines)
         ),

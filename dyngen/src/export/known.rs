@@ -50,7 +50,7 @@ impl Known {
         let unknown: Vec<&str> = given.names().filter(|n| !is_of(arm, n)).collect();
         if !unknown.is_empty() {
             return Err(format!(
-                "{file}: {} are sums of parameters, of which no single link's follow: take the \
+                "{file}: {} are sums of parameters, which do not give the values of a single link: take the \
                  identified.json of `powerball identify`, which has a body for each link, or a values file \
                  with every parameter of the arm",
                 unknown.join(", ")

@@ -83,7 +83,7 @@ fn share(
         return Ok(Share { link, body: rest.seen_from(pose), emptied: Vec::new(), note: None });
     }
     let note = format!(
-        "link '{name}' has the whole inertia of {}: with theirs left on them it would be that of no body",
+        "link '{name}' has the whole inertia of {}: if the others kept theirs, no body could have the rest",
         joint.links.join(", ")
     );
     let emptied = others.into_iter().cloned().collect();
@@ -114,8 +114,7 @@ fn same_arm(arm: &Arm, chain: &Chain) -> Result<(), String> {
     let named = |i: usize| arm.joints[i].name.as_deref().is_none_or(|name| name == plain(names[i]));
     if names.len() != arm.links() || !(0..names.len()).all(named) {
         return Err(format!(
-            "its joints are {}, those of the arm {}: give base, tip and lock as they were given to \
-             the import",
+            "its joints are {}, those of the arm {}: give the same base, tip and lock as for the import",
             names.join(", "),
             all_names(arm).join(", ")
         ));
@@ -125,8 +124,8 @@ fn same_arm(arm: &Arm, chain: &Chain) -> Result<(), String> {
         let (distance, angle) = apart(axis, joint.kind, &joint.point, &joint.direction);
         if distance > APART || angle > APART {
             return Err(format!(
-                "joint '{}': its axis lies {:.3} mm and {:.3} mrad from that of the arm file, which is \
-                 another arm or was imported with another base",
+                "joint '{}': its axis lies {:.3} mm and {:.3} mrad from that of the arm file: it is another \
+                    arm, or it was imported with another base",
                 joint.name,
                 1e3 * distance,
                 1e3 * angle

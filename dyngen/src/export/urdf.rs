@@ -59,8 +59,8 @@ pub fn urdf(
         let mut friction = known.friction.as_ref().and_then(|f| f[i]);
         if arm.coupled_motor(i).is_some() && friction.take().is_some() {
             writer.notes.push(format!(
-                "joint '{}': its motor turns with several joints, and its friction is the motor's: a URDF has no place \
-                 for it, what stood at the joint stays",
+                "joint '{}': its motor turns with several joints, and its friction is the motor's: a URDF \
+                    has no place for it, and the joint keeps its values",
                 chain.joints[i].name
             ));
         }

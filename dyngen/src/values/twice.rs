@@ -37,7 +37,8 @@ pub(super) fn keys(text: &str) -> Vec<(usize, usize, String)> {
                     && let Some(first) = seen.insert(key, line)
                 {
                     let column = text[start..at].chars().count() + 1;
-                    let message = format!("'{key}' stands twice, in line {first} too: which value is meant?");
+                    let message =
+                        format!("'{key}' is given twice, also in line {first}: which value is meant?");
                     found.push((line, column, message));
                 }
             }

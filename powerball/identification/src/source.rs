@@ -194,8 +194,8 @@ pub fn summarize<'a, S: Into<Source<'a>>>(
             Ok(Summarized { mounting, bands, unusable: only.doubts, warnings: gathered.warnings })
         }
         _ => Err(IdentifyError::Unusable(vec![format!(
-            "these are of several mountings of the base ({}): a summary has one; give them to identify as \
-                they are",
+            "these are of several mountings of the base ({}): a summary has one; give the logs themselves \
+                to identify",
             mountings.join("; ")
         )])),
     }

@@ -46,8 +46,9 @@ impl Findings<'_> {
         }
         if !self.resting.is_empty() {
             reasons.push(format!(
-                "joint {} does not move in the logs to fit: nothing is known of its friction, and the parameters that its \
-                 torque would show are taken for 0 in the other joints; record paths on which it swings (powerball excite)",
+                "joint {} does not move in the logs to fit: its friction is not known, and the parameters \
+                    that its torque would show are set to 0 in the other joints; record paths on which it \
+                    swings (powerball excite)",
                 list(&self.resting)
             ));
         }
@@ -60,7 +61,8 @@ impl Findings<'_> {
         if self.indefinite > INDEFINITE {
             reasons.push(format!(
                 "the mass matrix B(q) of these values is not positive definite at {:.0} % of the poses: no real arm has \
-                 them, and forward dynamics with them is useless; consistent.json has the nearest values that one can have",
+                 them, and forward dynamics with them is useless; consistent.json has the nearest possible \
+                 values",
                 100.0 * self.indefinite
             ));
         }

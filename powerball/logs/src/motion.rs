@@ -90,7 +90,7 @@ impl Motion {
             let value = |k: usize| -> Result<f64, String> {
                 let cell = cells.get(k).copied().unwrap_or("");
                 cell.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| {
-                    format!("line {}: \"{cell}\" in column {} is no number", at + 1, header[k])
+                    format!("line {}: \"{cell}\" in column {} is not a number", at + 1, header[k])
                 })
             };
             times.push(value(time)?);

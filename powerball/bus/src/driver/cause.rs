@@ -231,39 +231,49 @@ impl fmt::Display for Cause {
         }
         match self {
             Cause::OtherMaster(what) => {
-                write!(f, "another master is on the bus, it sends {what}: end it, or leave the arm to it")
+                write!(
+                    f,
+                    "another master is on the bus and sends {what}: stop it, or do not use this arm now"
+                )
             }
             Cause::TwoNodes(_) => f.write_str("its process data comes twice: two nodes have this id"),
             Cause::Interrupted => f.write_str("the program was asked to end"),
             Cause::HeartbeatLost(_) => f.write_str("heartbeat lost"),
             Cause::DataMissing(_) => f.write_str("process data missing"),
-            Cause::Rebooted(_) => f.write_str("restarted: it must be configured anew"),
+            Cause::Rebooted(_) => f.write_str("restarted: it must be configured again"),
             Cause::Emergency(_, emcy) => emcy.fmt(f),
             Cause::DriveFault(_, status) => write!(f, "drive fault, statusword {status:?}"),
             Cause::StateLost(_, status) => write!(f, "the drive left its state, statusword {status:?}"),
             Cause::UnknownState(_, status) => write!(f, "statusword {status:?}"),
-            Cause::WrongMode(_, mode) => write!(f, "the drive is in another mode than asked for: {mode}"),
+            Cause::WrongMode(_, mode) => write!(f, "the drive is in another mode than requested: {mode}"),
             Cause::NotOperational(_) => f.write_str("left NMT operational"),
-            Cause::Late => f.write_str("too many SYNCs late or left out: the driver is polled too seldom"),
+            Cause::Late => {
+                f.write_str("too many SYNCs late or left out: the driver is not polled often enough")
+            }
             Cause::Starved => f.write_str("no new set-points"),
             Cause::Setpoints(rejection) => write!(f, "set-points rejected again and again: {rejection}"),
             Cause::Hindered(_, why, status) => write!(f, "{why}, statusword {status:?}"),
             Cause::FollowingError(_, error, limit) => {
                 write!(
                     f,
-                    "following error {error:.4} rad, {limit:.4} may be: is the joint blocked, its brake closed?"
+                    "following error {error:.4} rad, above the limit {limit:.4}: is the joint blocked, or \
+                        its brake closed?"
                 )
             }
             Cause::VelocityError(_, error, limit) => {
-                write!(f, "velocity error {error:.3} rad/s, {limit:.3} may be: is the joint blocked?")
+                write!(
+                    f,
+                    "velocity error {error:.3} rad/s, above the limit {limit:.3}: is the joint blocked?"
+                )
             }
             Cause::Stuck(_, left) => {
-                write!(f, "stands still {left:.4} rad from its target: is it blocked, its brake closed?")
+                write!(f, "stands still {left:.4} rad from its target: is it blocked, or its brake closed?")
             }
             Cause::PositionJump(_, step, most) => {
                 write!(
                     f,
-                    "the measured position jumped by {step:.4} rad, {most:.4} can be: check the encoder"
+                    "the measured position jumped by {step:.4} rad, more than the possible {most:.4}: check \
+                        the encoder"
                 )
             }
             Cause::PositionLimit(_, q, limit) => {
@@ -272,24 +282,22 @@ impl fmt::Display for Cause {
             Cause::TorqueLimit(_, current, limit) => {
                 write!(
                     f,
-                    "its current stays at {current:.2} A, the limit is {limit:.2} A: blocked, or loaded too much"
+                    "its current stays at {current:.2} A, the limit is {limit:.2} A: the joint is blocked \
+                        or overloaded"
                 )
             }
             Cause::WrongVelocityScale(_, part) => {
                 write!(
                     f,
-                    "went {part:.2} of the travel that the velocities asked for: check the scale of 0x604C, or \
-                        free the joint"
+                    "went {part:.2} of the travel that the commanded velocities give: check the scale of \
+                        0x604C, or free the joint"
                 )
             }
             Cause::Overspeed(joint, velocity, limit) => {
-                write!(f, "joint {joint} moves at {velocity:.3} rad/s, {limit:.3} may be")
+                write!(f, "joint {joint} moves at {velocity:.3} rad/s, above the limit {limit:.3}")
             }
             Cause::ImplausibleVelocity(_, joint, velocity) => {
-                write!(
-                    f,
-                    "joint {joint} reports {velocity:.3} rad/s, which no joint can have: check the encoder"
-                )
+                write!(f, "joint {joint} reports {velocity:.3} rad/s, which is impossible: check the encoder")
             }
             Cause::PositionAgainstVelocity(_, joint, slip) => {
                 write!(
@@ -299,20 +307,21 @@ impl fmt::Display for Cause {
                 )
             }
             Cause::CurrentError(_, joint, measured, asked) => {
-                write!(f, "joint {joint}: {measured:.2} A are measured where {asked:.2} A were asked for")
+                write!(f, "joint {joint}: {measured:.2} A are measured, {asked:.2} A were commanded")
             }
             Cause::TorqueError(_, joint, left, limit) => {
                 write!(
                     f,
-                    "joint {joint}: {left:.1} N·m of its torque do not act as the model says, {limit:.1} may be: is it \
-                        blocked, pushed, its encoder stuck, its drive without power?"
+                    "joint {joint}: {left:.1} N·m of its torque do not act as the model predicts, above the \
+                        limit {limit:.1}: is it blocked or pushed, its encoder stuck, or its drive without \
+                        power?"
                 )
             }
             Cause::OffPath(_, joint, far, limit) => {
                 write!(
                     f,
-                    "joint {joint} is {far:.4} rad from where it should be, {limit:.4} may be: is it blocked or pushed, its \
-                        encoder stuck, the model another arm's?"
+                    "joint {joint} is {far:.4} rad from where it should be, above the limit {limit:.4}: is \
+                        it blocked or pushed, its encoder stuck, or the model that of another arm?"
                 )
             }
             Cause::BusOff => f.write_str("CAN controller off the bus"),
@@ -337,13 +346,13 @@ impl fmt::Display for Cause {
             }
             Cause::Sdo(_, object, error) => write!(f, "{object}: {error}"),
             Cause::NoWatch(_, object, error) => {
-                write!(f, "cannot be made to watch the master, so it may not move; {object}: {error}")
+                write!(f, "cannot be configured to watch the master, so it must not move; {object}: {error}")
             }
             Cause::NotTaken(_, object, written, read) => {
                 write!(f, "{object} reads back 0x{read:X} after 0x{written:X} was written")
             }
             Cause::Implausible(_, object, read) => {
-                write!(f, "{object} reads 0x{read:X}, which makes no sense")
+                write!(f, "{object} reads 0x{read:X}, which is not a valid value")
             }
             Cause::Transition(_, from, to, why) => {
                 write!(f, "stays in \"{from}\", should be in \"{to}\": {why}")
@@ -414,7 +423,7 @@ pub enum Refusal {
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Refusal::Phase(what) => write!(f, "not now: the driver {what}"),
+            Refusal::Phase(what) => write!(f, "not possible now: the driver {what}"),
             Refusal::Latched(cause) => write!(f, "acknowledge the cause of the last stop first: {cause}"),
             Refusal::NoMode(mode) => write!(f, "the profile knows nothing of {mode} mode"),
             Refusal::NotVerified(mode) => {
@@ -427,10 +436,10 @@ impl fmt::Display for Refusal {
             Refusal::BusLoad(load) => {
                 write!(
                     f,
-                    "the bus would be loaded to {:.1} % in the worst case: fewer objects, ",
+                    "the bus would be loaded to {:.1} % in the worst case: map fewer objects, ",
                     100.0 * load
                 )?;
-                f.write_str("a lower rate or a higher bit rate are needed")
+                f.write_str("take a lower rate, or a higher bit rate")
             }
             Refusal::Profile(what) => write!(f, "the profile cannot be used: {what}"),
             Refusal::Mapping(error) => error.fmt(f),
@@ -481,13 +490,16 @@ impl fmt::Display for Rejection {
                 write!(f, "joint {j}: {i:.3} A is more than the greatest current {limit:.3} A")
             }
             Rejection::Jump(j, step, limit) => {
-                write!(f, "joint {j}: a step of {step:.5} in one cycle, {limit:.5} can be")
+                write!(f, "joint {j}: a step of {step:.5} in one cycle, above the limit {limit:.5}")
             }
             Rejection::Acceleration(j, a, limit) => {
-                write!(f, "joint {j}: its set-points accelerate by {a:.2} rad/s², {limit:.2} rad/s² can be")
+                write!(
+                    f,
+                    "joint {j}: its set-points accelerate by {a:.2} rad/s², above the limit {limit:.2} rad/s²"
+                )
             }
             Rejection::Torque(j, torque, limit) => {
-                write!(f, "joint {j}: the set-points take {torque:.1} N·m, {limit:.1} N·m can be")
+                write!(f, "joint {j}: the set-points need {torque:.1} N·m, above the limit {limit:.1} N·m")
             }
             Rejection::Saturated(j) => {
                 write!(f, "joint {j}: the drive's number type cannot hold the set-point")

@@ -353,8 +353,8 @@ impl<const N: usize> Profile<N> {
                 || joint.torque.partial_cmp(&0.0) != Some(core::cmp::Ordering::Greater)
             {
                 return wrong(
-                    "a joint's limits are no range, or its velocity, acceleration, torque, current, greatest following or \
-                        velocity error or scale is not positive",
+                    "a joint's limits are not a range, or its velocity, acceleration, torque, current, \
+                        greatest following or velocity error or scale is not positive",
                 );
             }
         }
@@ -365,7 +365,7 @@ impl<const N: usize> Profile<N> {
             );
         }
         if self.sync_timeout_factor == Some(0) || self.master_watch_ms == 0 || self.node_heartbeat_ms == 0 {
-            return wrong("the drives must watch the master and be watched: no such time may be 0");
+            return wrong("the drives must watch the master and be watched: none of these times may be 0");
         }
         if self.master_heartbeat == 0 || self.master_heartbeat > Micros::from(self.master_watch_ms) * 500 {
             return wrong(

@@ -66,7 +66,9 @@ impl fmt::Display for ArmError {
                 write!(f, "the arm was stopped: {cause}")
             }
             ArmError::Stopped(cause, details) => write!(f, "the arm was stopped: {cause}; {details}"),
-            ArmError::Slow(wanted, now) => write!(f, "the driver {now}, and not soon enough {wanted}"),
+            ArmError::Slow(wanted, now) => {
+                write!(f, "in time the driver was not in this state: {wanted}; it {now}")
+            }
             ArmError::Bus(e) => e.fmt(f),
         }
     }

@@ -141,7 +141,8 @@ impl<B: Bus + ?Sized> Bus for &mut B {
 pub fn open(url: &BusUrl) -> Result<Box<dyn Bus>, BusError> {
     match url {
         BusUrl::Virtual => Err(BusError::Io(
-            "virtual: this bus lives within one program; name one that others reach".to_string(),
+            "virtual: this bus exists within one program only; give one that other programs reach"
+                .to_string(),
         )),
         #[cfg(all(target_os = "linux", feature = "socketcan"))]
         BusUrl::SocketCan(interface) => Ok(Box::new(SocketCan::open(interface)?)),

@@ -134,7 +134,7 @@ fn bind_device(name: &str, sockets: &[&Socket]) -> std::io::Result<u32> {
 
 #[cfg(not(target_os = "linux"))]
 fn bind_device(_: &str, _: &[&Socket]) -> std::io::Result<u32> {
-    Err(std::io::Error::other("interfaces have names on Linux alone: give the interface's own address"))
+    Err(std::io::Error::other("names of interfaces work only on Linux: give the interface's own address"))
 }
 
 impl Bus for UdpMulticast {

@@ -54,8 +54,7 @@ impl fmt::Display for UrlError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "\"{}\" names no bus: {}. Buses are: virtual, socketcan:can0, slcan:/dev/ttyACM0, \
-                \
+            "\"{}\" is not a bus: {}. Buses are: virtual, socketcan:can0, slcan:/dev/ttyACM0, \
                 slcan:/dev/ttyACM0?bitrate=250000, udp:239.74.163.2:43113, udp:239.74.163.2:43113@eth0",
             self.text, self.why
         )
@@ -72,7 +71,7 @@ impl FromStr for BusUrl {
         let (kind, rest) = text.split_once(':').unwrap_or((text, ""));
         match (kind, rest) {
             ("virtual", "") => Ok(BusUrl::Virtual),
-            ("virtual", _) => Err(wrong("virtual takes nothing behind it")),
+            ("virtual", _) => Err(wrong("nothing may follow virtual")),
             ("socketcan", "") => Err(wrong("the interface is missing")),
             ("socketcan", name) if name.len() > NAME => {
                 Err(wrong("names of interfaces have at most 15 letters"))
@@ -85,7 +84,7 @@ impl FromStr for BusUrl {
             }
             ("udp", rest) => match group_of(rest) {
                 Some((group, interface)) if group.ip().is_multicast() => Ok(BusUrl::Udp(group, interface)),
-                Some(_) => Err(wrong("the address is no multicast group (224.0.0.0 to 239.255.255.255)")),
+                Some(_) => Err(wrong("the address is not a multicast group (224.0.0.0 to 239.255.255.255)")),
                 None => Err(wrong(
                     "udp needs an address and a port, and after @ an interface by its name or its own address",
                 )),
@@ -102,7 +101,7 @@ fn port_of(text: &str) -> Result<(PathBuf, u32), String> {
         return Err("the serial device is missing".to_string());
     }
     let bitrate = option.strip_prefix("bitrate=").and_then(|bitrate| bitrate.parse().ok());
-    let bitrate = bitrate.ok_or("behind ? slcan takes bitrate= and a number in bit/s")?;
+    let bitrate = bitrate.ok_or("after ? slcan takes bitrate= and a number in bit/s")?;
     slcan::speed(bitrate)?;
     Ok((PathBuf::from(path), bitrate))
 }

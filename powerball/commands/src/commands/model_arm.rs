@@ -50,7 +50,7 @@ pub fn parts(on: &ModelArm, path: &DrivenPath<6>, running: f64) -> Result<Parts<
     match parts.beyond(&limits) {
         None => Ok(parts),
         Some((sample, joint, torque)) => Err(format!(
-            "the trajectory takes {torque:.1} N·m of joint {} at {:.3} s, {:.1} N·m can be",
+            "the trajectory needs {torque:.1} N·m of joint {} at {:.3} s, above its limit {:.1} N·m",
             joint + 1,
             sample as f64 * path.motion().period,
             limits[joint]
@@ -64,7 +64,7 @@ pub fn parts(on: &ModelArm, path: &DrivenPath<6>, running: f64) -> Result<Parts<
 /// A model whose file does not say that.
 pub fn contact_detector(on: &ModelArm) -> Result<ContactDetector<f64, 6>, String> {
     let colour = on.model.colour.as_ref().ok_or(
-        "the model does not say what it leaves where it holds (`colour`): take model.json of `powerball explain`",
+        "the model file has no spectrum of its residual (`colour`): take model.json of `powerball explain`",
     )?;
     let rate = rows_a_second(colour.rate);
     let of = |joint: &JointColour| {

@@ -201,7 +201,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
                 let to: Vec<String> = to.iter().map(|q| format!("{q:.3}")).collect();
                 let to = to.join(", ");
                 RecordError::Barred(format!(
-                    "on the straight way to ({to}) rad {why}: move the arm nearer to there first"
+                    "on the straight path to ({to}) rad {why}: move the arm nearer to that pose first"
                 ))
             }
             other => other,
@@ -483,7 +483,7 @@ mod tests {
         let barred = move |m: &Motion| (highest(m) <= begin + 1e-6).then(|| "it is barred".to_string());
         let refused =
             record(arm(), &motion, Envelope::new(barred), |_| (), &mut log).unwrap_err().to_string();
-        assert!(refused.contains("on the straight way to (0.100, 0.400, "), "{refused}");
+        assert!(refused.contains("on the straight path to (0.100, 0.400, "), "{refused}");
         assert!(refused.contains("rad it is barred: move the arm nearer"), "{refused}");
         let everything = Envelope::new(|_: &Motion| Some("it is barred".into()));
         let refused = record(arm(), &motion, everything, |_| (), &mut log).unwrap_err();

@@ -82,7 +82,7 @@ impl<B: Bus, const N: usize> TorqueLoop<B, N> {
             let units = joints[j].units;
             return Err(RecordError::Barred(format!(
                 "joint {}: its torque constant is not known: {} N·m at a rated current of {} A. Set rated_torque in the bus \
-                    profile, and rated_current where the drive does not tell 0x6075",
+                    profile, and rated_current if the drive does not report 0x6075",
                 j + 1,
                 units.rated_torque,
                 units.rated_current

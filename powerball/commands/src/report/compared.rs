@@ -16,9 +16,8 @@ pub fn files(compared: &Comparison) -> Result<Files, String> {
 pub fn page(compared: &Comparison) -> Page {
     let mut page = Page::new(format!("Two fits of {}", compared.arm));
     page.lead(&format!(
-        "A: {}. B: {}. Differences are B less A; the intervals of all {} numbers hold at once, and equal \
-            arms are called \
-            different in {} % of comparisons.",
+        "A: {}. B: {}. Differences are B minus A. The intervals of all {} numbers hold simultaneously; \
+            equal arms are reported as different in {} % of comparisons.",
         compared.a,
         compared.b,
         compared.comparisons,
@@ -33,7 +32,8 @@ pub fn page(compared: &Comparison) -> Page {
     });
     page.heading("Torque");
     page.paragraph(
-        "How far the torques of the two models differ along the logs of A, and how far the errors of the fits alone explain it.",
+        "How far the torques of the two models differ along the logs of A, and how much of that the errors \
+            of the fits alone explain.",
     );
     let mut table =
         Table::new(["joint", "difference, rms [N·m]", "of the torque", "explained by the errors [N·m]"]);

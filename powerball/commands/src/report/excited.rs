@@ -25,7 +25,8 @@ pub fn page(excited: &Excited) -> Page {
         if let Some(figure) = torques(trajectory) {
             page.figure(
                 &figure,
-                "Torque expected by the model or guess below, as a share of what may be used of each limit.",
+                "Torque expected from the model or estimate below, as a share of the usable part of each \
+                    limit.",
             );
         }
         if let Some(figure) = distances(trajectory) {
@@ -33,7 +34,7 @@ pub fn page(excited: &Excited) -> Page {
         }
     }
     page.heading("Assumed");
-    let mut table = Table::new(["what the file does not say"]);
+    let mut table = Table::new(["what the arm file does not give"]);
     excited.assumed.iter().for_each(|line| table.push([line.clone()]));
     page.table(&table);
     page

@@ -23,10 +23,14 @@ const INKS: [Ink; 3] = [Ink::Grey, Ink::Orange, Ink::Blue];
 #[must_use]
 pub fn page<const N: usize>(followed: &Followed, path: &Path<N>, tracks: &[(&str, Track<N>)]) -> Page {
     let mut page = Page::new(format!("{} along a path", followed.arm));
-    page.lead("Measured less wanted position by joint, and what the torque was for. Nothing of this was run on hardware by this project.");
+    page.lead(
+        "Measured minus desired position by joint, and the torque that was needed. This project ran none of \
+        it on hardware.",
+    );
     let mut facts = vec![("with", followed.with.clone()), ("cycles", followed.cycles.to_string())];
     if followed.delay > 0.0 {
-        facts.push(("drives follow late by", format!("{:.1} ms, which is no error", 1e3 * followed.delay)));
+        facts
+            .push(("drives follow late by", format!("{:.1} ms, not counted as error", 1e3 * followed.delay)));
     }
     if let (Some(bandwidth), Some(pole)) = (followed.bandwidth, followed.largest_pole) {
         facts.push(("feedback", format!("{} rad/s, largest pole {pole:.3}", number(bandwidth))));

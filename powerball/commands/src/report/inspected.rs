@@ -17,7 +17,7 @@ pub fn files(files: &[Inspected]) -> Result<Files, String> {
 pub fn page(files: &[Inspected]) -> Page {
     let names: Vec<&str> = files.iter().map(|f| f.file.as_str()).collect();
     let mut page = Page::new(format!("Logs: {}", names.join(", ")));
-    page.lead("What is in the files, what it is taken to be, and how it runs.");
+    page.lead("What the files contain, how it is interpreted, and the signals over time.");
     for file in files {
         of_file(&mut page, file);
     }
@@ -54,8 +54,8 @@ fn of_file(page: &mut Page, file: &Inspected) {
         page.table(&pairs);
     }
     if let Some(log) = &file.log {
-        page.subheading("The log that is taken");
-        page.figure(&taken(log), "In SI units, signs and faults put right as the notes say.");
+        page.subheading("The log as it is used");
+        page.figure(&taken(log), "In SI units, with signs and faults corrected as the notes say.");
     }
 }
 
@@ -76,11 +76,11 @@ fn of_table(page: &mut Page, table: &InspectedTable) {
         facts.push(("gaps", format!("{}, the longest {longest:.3} s", table.gaps)));
     }
     if table.not_rising > 0 {
-        facts.push(("time stamps that do not rise", table.not_rising.to_string()));
+        facts.push(("time stamps that do not increase", table.not_rising.to_string()));
     }
     page.facts(facts);
     if let Some(doubt) = &table.clock_doubt {
-        page.note(Tone::Plain, &format!("Time of receipt counts: {doubt}."));
+        page.note(Tone::Plain, &format!("Time of receipt is used: {doubt}."));
     }
     let mut columns = Table::new(["column", "is", "joint", "unit", "from", "to", "missing"]);
     for column in &table.columns {

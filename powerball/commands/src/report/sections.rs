@@ -14,7 +14,7 @@ pub fn columns_verdict(page: &mut Page, conventions: &Conventions) {
 pub fn add_conventions(page: &mut Page, conventions: &Conventions) {
     columns_verdict(page, conventions);
     let mut table =
-        Table::new(["question", "as said", "held-out error as it is [%]", "as it would be [%]", "evidence"]);
+        Table::new(["question", "as said", "held-out error now [%]", "after the change [%]", "evidence"]);
     for answer in &conventions.answers {
         let said = match answer.as_said {
             Some(true) => "yes",

@@ -17,8 +17,8 @@ pub fn files(verified: &Verified) -> Result<Files, String> {
 pub fn page(verified: &Verified) -> Page {
     let mut page = Page::new(format!("Torque model of {}, verified", verified.arm));
     page.lead(
-        "A model on logs that it has not seen: measured against predicted torque, 95 % intervals of \
-        the error from blocks that count as independent.",
+        "A model on logs that were not fitted: measured and predicted torque, 95 % intervals of the error \
+            from blocks that count as independent.",
     );
     let percent = 100.0 * verified.tolerance;
     match verified.within_tolerance {

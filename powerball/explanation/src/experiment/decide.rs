@@ -64,7 +64,7 @@ pub fn decide(
             Some(first.name),
             format!(
                 "{} fits all logs better by χ² {evidence:.0} (p = {p_value:.1e} between blocks), and by \
-                    {held_out:.0} where nothing was fitted",
+                    {held_out:.0} on logs that were not fitted",
                 first.name
             ),
         )
@@ -74,7 +74,7 @@ pub fn decide(
         (
             Some(simpler.name),
             format!(
-                "{} comes out the same within {:.0} % and needs {} more: it is {}",
+                "{} fits equally well within {:.0} % and needs {} more: the answer is {}",
                 more.name,
                 (100.0 * share).ceil(),
                 own_a.abs_diff(own_b),
@@ -85,8 +85,8 @@ pub fn decide(
         (
             None,
             format!(
-                "{} leads {} by χ² {evidence:.1} on the fitted and {held_out:.1} on the held-out logs (p = \
-                    {p_value:.2}): not enough",
+                "{} is ahead of {} by χ² {evidence:.1} on the fitted and {held_out:.1} on the held-out logs \
+                    (p = {p_value:.2}): not enough",
                 first.name, second.name
             ),
         )

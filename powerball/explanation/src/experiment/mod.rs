@@ -21,7 +21,7 @@ pub const TRAJECTORY: &str = "next_experiment.csv";
 /// where nothing is open or the arm file has no limits to move within.
 pub fn propose(body: &RigidArm, explained: &mut Explained, options: &ExplainOptions<'_>) -> Option<Motion> {
     let open = explained.open.clone()?;
-    options.progress.say("designing the experiment that tells the open names apart");
+    options.progress.say("designing the experiment that distinguishes the open names");
     let designed = design(body, &open, &options.data);
     let next = explained.next_experiment.as_mut()?;
     match designed {
@@ -52,12 +52,12 @@ fn advice(open: &Open, design: &DesignedExperiment, visible: f64) -> String {
          with new.csv among the logs; --experiment does both"
     );
     if design.evidence >= visible {
-        format!("to tell {both} apart, {how}")
+        format!("to distinguish {both}, {how}")
     } else {
         format!(
             "{both} predict nearly the same torques on every path within the limits (on the best path found the wrong one \
-             is expected to fit worse by χ² = {:.1}, and {visible:.0} would be clear): where the new log decides for none of \
-             them, the one with fewer numbers is taken; {how}",
+             is expected to fit worse by χ² = {:.1}, and {visible:.0} would be clear): if the new log does \
+             not decide, the one with fewer numbers is taken; {how}",
             design.evidence
         )
     }
@@ -85,7 +85,7 @@ pub fn learn(
     let Some(open) = before.open.as_ref() else {
         return explain_body(body, &fit, &held_out, options);
     };
-    options.progress.say("asking the new log which of the open names is right");
+    options.progress.say("testing on the new log which of the open names is right");
     let decision = decide(body, open, &fit, &held_out, options)?;
     let mut result = options.clone();
     result.ruled_out.extend(ruled_out(open, &decision));

@@ -64,14 +64,14 @@ pub fn explain_body(
     };
     let mut findings = found(Inertia::Shared, ValidationOnly::TakenOut)?;
     if !findings.initial_fit.validation_only.is_empty() {
-        options.progress.say("the same with the logs to judge on as they are");
+        options.progress.say("the same with unchanged validation logs");
         findings = findings.or_as_logged(found(Inertia::Shared, ValidationOnly::Kept)?);
     }
     if findings.study.one_path {
         options.progress.say("one path: joints by themselves");
         findings = findings.or_better(found(Inertia::PerJoint, ValidationOnly::Kept)?);
     }
-    options.progress.say("looking at what is left");
+    options.progress.say("examining the remaining error");
     results::conclude(findings)
 }
 
@@ -94,7 +94,7 @@ fn find(Prepared { study, base, initial_fit }: Prepared<'_>) -> Findings<'_> {
                 among = CandidateKind::Names;
             }
             Outcome::Chance(candidates) => {
-                study.say(&format!("step {}: what fits best fits no better than by chance", number + 1));
+                study.say(&format!("step {}: the best candidate fits no better than chance", number + 1));
                 model.given_up.extend(candidates);
             }
             // Only now is it known what is left after all that fits.
@@ -111,7 +111,7 @@ fn find(Prepared { study, base, initial_fit }: Prepared<'_>) -> Findings<'_> {
         }
     }
     while withhold(&study, &mut model, &mut history).is_some() {}
-    study.say("judging the zeros of the torques");
+    study.say("testing the zeros of the torques");
     history.steps.extend(judge_baseline(&study, &mut model));
     while withhold_harmful(&study, &mut model, &mut history).is_some() {}
     study.say("refining settings");
@@ -119,7 +119,7 @@ fn find(Prepared { study, base, initial_fit }: Prepared<'_>) -> Findings<'_> {
     drop_words(&study, &mut model);
     study.say("looking for ripple above the band");
     history.steps.extend(ripple_above_band(&study, &mut model, 2 * study.rule().most_steps));
-    study.say("asking time-shift surrogates");
+    study.say("testing time-shift surrogates");
     let false_positives = search::false_positives(&study, &model);
     Findings { study, initial_fit, model, history, false_positives }
 }

@@ -210,10 +210,10 @@ impl TorqueModel {
         let json: Value = serde_json::from_str(text).map_err(|e| wrong(format!("is no JSON: {e}")))?;
         for key in ["parameters", "friction"] {
             if !json[key].is_array() {
-                return Err(wrong(format!("has no list '{key}': it is no model.json or identified.json")));
+                return Err(wrong(format!("has no list '{key}': it is not a model.json or identified.json")));
             }
         }
-        serde_json::from_value(json).map_err(|e| wrong(format!("is no torque model: {e}")))
+        serde_json::from_value(json).map_err(|e| wrong(format!("is not a torque model: {e}")))
     }
 
     /// Whether the model is one of an arm whose minimal set has these names; every number must be finite.

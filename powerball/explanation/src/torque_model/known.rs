@@ -231,7 +231,8 @@ impl KnownModel for ModelFile {
         let changes = &self.model.additions.arm_changes;
         if mounting != Mounting::Filed && changes.gravity.is_some() {
             return Err(format!(
-                "{}: says how the base is tilted where it stands as filed, and nothing of it mounted otherwise",
+                "{}: the tilt of the base is known only for the mounting of the arm file, not for other \
+                    mountings",
                 self.file.display()
             ));
         }

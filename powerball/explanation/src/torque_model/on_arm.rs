@@ -32,7 +32,8 @@ impl<const N: usize> ModelOnArm<N> {
             ));
         }
         if !arm.transmissions.is_empty() {
-            let what = "the arm file couples joints by a transmission, which control laws here do not know";
+            let what = "the arm file couples joints by a transmission, which the control laws here do not \
+                support";
             return Err(what.to_string());
         }
         let arm = read.arm(arm, Mounting::Filed)?;

@@ -194,8 +194,7 @@ impl<'a> Stream<'a> {
             self.colours[j] = colour;
             if self.colours[j].is_none() {
                 self.notes.push(format!(
-                    "joint {} is not watched: what the model leaves there wanders as slowly as the changes that are \
-                     looked for",
+                    "joint {} is not watched: its residual drifts as slowly as the changes to detect",
                     j + 1
                 ));
             }
@@ -226,20 +225,21 @@ fn beginning(setting: Setting<'_>, known: Option<&Colour>, rate: f64) -> Vec<Str
             let blind = colour.joints.iter().enumerate().filter(|(_, joint)| joint.is_none());
             let blind: Vec<String> = blind.map(|(j, _)| (j + 1).to_string()).collect();
             let note = format!(
-                "joint {} is not watched: it moved too little in the logs of the model, or what the model leaves there wanders \
-                 as slowly as the changes that are looked for (its verdict says only how much that is)",
+                "joint {} is not watched: it moved too little in the logs of the model, or its residual \
+                    drifts as slowly as the changes to detect (its verdict gives only the size of the \
+                    residual)",
                 blind.join(", ")
             );
             (!blind.is_empty()).then_some(note).into_iter().collect()
         }
         (None, Some(colour)) => vec![format!(
-            "{file} has {rate:.0} samples a second, the model's colour was learnt at {:.0}: the first {learn:.0} s of \
-             motion are taken as good",
+            "{file} has {rate:.0} samples a second, the spectrum of the model's residual was learnt at \
+                {:.0}: the first {learn:.0} s of motion are taken as good",
             colour.rate
         )],
         (None, None) => vec![format!(
-            "{file}: the model does not say what it leaves where it holds (`powerball explain` writes it): the first \
-             {learn:.0} s of motion are taken as good"
+            "{file}: the model file has no spectrum of its residual (`powerball explain` writes it): the \
+                first {learn:.0} s of motion are taken as good"
         )],
     }
 }

@@ -181,7 +181,7 @@ pub(super) fn sentence(found: &Differences, causes: &[Cause]) -> String {
 fn in_words(cause: &Cause) -> String {
     match cause {
         Cause::Payload { link, mass, first_moment, .. } => {
-            let moment = format!("first moments that the logs tell differ by {first_moment:.3} kg·m");
+            let moment = format!("first moments that the logs determine differ by {first_moment:.3} kg·m");
             match mass {
                 Some([mass, std]) => {
                     let which = if *mass >= 0.0 { "heavier" } else { "lighter" };
@@ -191,11 +191,13 @@ fn in_words(cause: &Cause) -> String {
                             its {moment}"
                     )
                 }
-                None => format!("another payload: on link {link} {moment}; these logs do not tell its mass"),
+                None => {
+                    format!("another payload: on link {link} {moment}; these logs do not determine its mass")
+                }
             }
         }
         Cause::Inertia { parameters } => format!(
-            "the inertial parameters {} differ, and not as a body on one link would make them",
+            "the inertial parameters {} differ, but not as a body on one link would change them",
             parameters.join("; ")
         ),
         Cause::Friction { joint, change: [low, high] } => {
@@ -207,8 +209,8 @@ fn in_words(cause: &Cause) -> String {
         }
         Cause::SensorZero { joint, change: [low, high] } => {
             format!(
-                "another sensor zero on joint {joint}: a constant torque of {low:.3} to {high:.3} N·m \
-                came in"
+                "another sensor zero on joint {joint}: a constant torque of {low:.3} to {high:.3} N·m was \
+                    added"
             )
         }
         Cause::AnotherUnit => {

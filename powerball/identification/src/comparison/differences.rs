@@ -76,9 +76,8 @@ impl Differences {
         let mut warnings = Vec::new();
         for side in [a, b].into_iter().filter(|side| side.uncertainty.is_none()) {
             warnings.push(format!(
-                "{}: there is no covariance.json next to it: standard errors count one by one, so less is \
-                    seen; identify \
-                    again to have it",
+                "{}: there is no covariance.json next to it: standard errors are used one by one, so fewer \
+                    differences are found; identify again to write it",
                 side.name
             ));
         }

@@ -78,7 +78,7 @@ impl Side {
         let file = if path.is_dir() { path.join("identified.json") } else { path.to_path_buf() };
         let text = dyngen::file::text(&file).map_err(|e| wrong(&file, format!("cannot be read: {e}")))?;
         let model: File = serde_json::from_str(&text)
-            .map_err(|e| wrong(&file, format!("is no result of `powerball identify`: {e}")))?;
+            .map_err(|e| wrong(&file, format!("is not a result of `powerball identify`: {e}")))?;
         let covariance = file.with_file_name("covariance.json");
         let own = file.file_name().is_some_and(|name| name == "identified.json");
         let uncertainty = match std::fs::read(&covariance) {

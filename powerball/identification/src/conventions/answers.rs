@@ -55,7 +55,7 @@ fn of_step(step: &Step, unit: &Unit) -> Answer {
 /// The question that a change answers, and what it says; `rival` is whether another change fits as well.
 fn in_words(change: &Change, rival: bool, unit: &Unit, why: &str) -> (&'static str, String) {
     let or =
-        |what: &str| if rival { format!(", or {what}: these logs do not tell which") } else { String::new() };
+        |what: &str| if rival { format!(", or {what}: these logs do not show which") } else { String::new() };
     let exchanged = |what: &str, [a, b]: [usize; 2]| {
         format!("{what} of {} are exchanged: the other way round {why}.", joints(&[a, b]))
     };
@@ -90,7 +90,8 @@ fn in_words(change: &Change, rival: bool, unit: &Unit, why: &str) -> (&'static s
         Change::Late(by) => {
             let (by, word) = (1000.0 * by.abs(), if *by > 0.0 { "late" } else { "early" });
             let text = format!(
-                "The torque columns are about {by:.0} ms {word} against the positions: without that {why}."
+                "The torque columns are about {by:.0} ms {word} relative to the positions: without that \
+                    {why}."
             );
             ("delay", text)
         }
@@ -118,16 +119,21 @@ fn in_words(change: &Change, rival: bool, unit: &Unit, why: &str) -> (&'static s
 fn factors_in_words(unit: &Unit) -> &'static str {
     match unit {
         Unit::BeforeGear(_) => {
-            "The torque columns are before the gear: the factors that one body asks for are those of rotor_ratio"
+            "The torque columns are before the gear: the factors that one rigid arm needs are those of \
+                rotor_ratio"
         }
         Unit::Ampere(Some(_)) => {
-            "The torque columns are currents: the factors that one body asks for are those of torque_constant"
+            "The torque columns are currents: the factors that one rigid arm needs are those of \
+                torque_constant"
         }
         Unit::Ampere(None) => {
-            "Each torque column has a unit of its own (currents, counts or % of rated): one body asks for other \
-             factors by joint"
+            "Each torque column has a unit of its own (currents, counts or % of rated): one rigid arm needs \
+                a different factor for each joint"
         }
-        _ => "Some torque columns are in another unit than most: one body asks for other factors by joint",
+        _ => {
+            "Some torque columns are in another unit than most: one rigid arm needs a different factor for \
+            each joint"
+        }
     }
 }
 
@@ -138,7 +144,7 @@ pub(super) fn of_arm_file(better: &Better) -> Answer {
         [] => String::new(),
         others => {
             let lines: Vec<&str> = others.iter().take(3).map(|other| other.line.as_str()).collect();
-            format!(" These logs do not tell it from: {}.", lines.join("; "))
+            format!(" These logs do not distinguish it from: {}.", lines.join("; "))
         }
     };
     Answer {
@@ -162,7 +168,7 @@ fn arm_file(facts: &Facts<'_>) -> Answer {
         return plain("arm file", Some(false), format!("In the arm file {}.", doubts.join("; ")));
     }
     if facts.coupled {
-        let why = "Whether the arm file is this arm's is not asked where a transmission couples joints.";
+        let why = "Whether the arm file belongs to this arm is not checked if a transmission couples joints.";
         return plain("arm file", None, why.into());
     }
     if good {
@@ -331,7 +337,7 @@ fn gravity(facts: &Facts<'_>) -> Answer {
         Some(GravityIs::Included) => plain(
             "gravity",
             Some(true),
-            "Torques hold what gravity asks for: without it the model fits clearly worse.".into(),
+            "Torques contain gravity: without it the model fits clearly worse.".into(),
         ),
         Some(GravityIs::TakenOut) if facts.size.is_weightless() => plain(
             "gravity",
@@ -341,9 +347,9 @@ fn gravity(facts: &Facts<'_>) -> Answer {
                 .into(),
         ),
         Some(GravityIs::TakenOut) => {
-            plain("gravity", Some(true), "Torques hold nothing of gravity, as the arm file says.".into())
+            plain("gravity", Some(true), "Torques do not contain gravity, as the arm file says.".into())
         }
-        None => plain("gravity", None, "Whether torques hold gravity is not shown by these logs.".into()),
+        None => plain("gravity", None, "Whether torques contain gravity is not shown by these logs.".into()),
     }
 }
 

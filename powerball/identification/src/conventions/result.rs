@@ -178,10 +178,10 @@ impl Conventions {
         let left = self.joints_with_much_left();
         if !wrong.is_empty() {
             let suggested_map = self.suggested_map.as_ref().map_or(String::new(), |suggested_map| {
-                format!(" A column map (--map) that sets this right:\n{suggested_map}")
+                format!(" A column map (--map) that corrects this:\n{suggested_map}")
             });
             let what = match (&self.arm_file, self.suggested_map.is_some()) {
-                (Some(_), false) => "The arm file is not this arm's.",
+                (Some(_), false) => "The arm file does not belong to this arm.",
                 (Some(_), true) => "Neither the arm file nor the columns are right.",
                 (None, _) => "The columns are not what they are declared to be.",
             };
@@ -192,10 +192,11 @@ impl Conventions {
             self.answers.iter().filter(|a| a.as_said.is_none()).map(|a| a.question).collect();
         let result = match left {
             Some(left) => format!(
-                "What the columns are cannot be checked: {left}. Columns and arm file are taken as they stand"
+                "What the columns are cannot be checked: {left}. Columns and arm file are used unchanged"
             ),
-            None => "The columns are taken as declared; nothing in these logs speaks clearly against it"
-                .to_string(),
+            None => {
+                "The columns are taken as declared; nothing in these logs clearly contradicts it".to_string()
+            }
         };
         if let Some(doubt) = self.doubt() {
             return format!("{result}. {doubt}");

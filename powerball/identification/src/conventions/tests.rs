@@ -183,7 +183,10 @@ fn an_arm_file_of_the_other_convention_is_reported() {
     assert_eq!(result.torque.gravity, Some(GravityIs::Included), "{}", result.evidence);
     assert_eq!((result.torque.sign.as_ref(), result.suggested_map.as_ref()), (Some(&PerJoint::All(1)), None));
     let first = result.verdict();
-    assert!(first.starts_with("The arm file is not this arm's. With convention = \"standard\""), "{first}");
+    assert!(
+        first.starts_with("The arm file does not belong to this arm. With convention = \"standard\""),
+        "{first}"
+    );
 }
 
 #[test]

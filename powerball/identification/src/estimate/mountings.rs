@@ -38,8 +38,10 @@ impl Together {
         let general = together(&arms)?;
         let filed = mountings.first().map(|(body, _)| body.filed()).ok_or("no mounting was given")?;
         let body = RigidArm::mounted(&general, &filed).map_err(|e| e.to_string())?;
-        let undetermined =
-            || "gravity between the mountings does not determine what they determine".to_string();
+        let undetermined = || {
+            "gravity between the mountings does not determine the parameters that each mounting determines"
+                .to_string()
+        };
         let in_set = |(own, bands): &(&RigidArm, &Bands)| bands.in_set(own, &body).ok_or_else(undetermined);
         let each = mountings.iter().map(in_set).collect::<Result<Vec<_>, _>>()?;
         let mut all = each.iter().cloned();

@@ -145,7 +145,7 @@ impl Constraints {
         if let (Some(load), Some(torque)) = (&self.load, &tightest.torque) {
             for (i, (tau, limit)) in torque.iter().zip(load.limits()).enumerate() {
                 if tau > limit {
-                    reasons.push(format!("joint {} takes {tau:.1} N·m of {limit:.1}", i + 1));
+                    reasons.push(format!("joint {} needs {tau:.1} N·m of {limit:.1}", i + 1));
                 }
             }
         }

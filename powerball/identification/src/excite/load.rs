@@ -115,7 +115,7 @@ impl Masses {
         masses.reserve = 0.5;
         masses.origin = format!(
             "no model was given: links are taken as solid capsules of {:.0} kg/m³ ({total:.1} kg in all), \
-                and half of each limit is left for friction and what that misses",
+                and half of each limit is left for friction and the error of this estimate",
             DENSITY * lighter
         );
         Ok(masses)

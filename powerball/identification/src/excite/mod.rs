@@ -56,7 +56,7 @@ pub enum Error {
         why: String,
     },
     /// The trajectory does not keep its constraints between the instants of the search: where.
-    #[error("the trajectory that was found does not hold: {0}")]
+    #[error("the trajectory that was found breaks a limit: {0}")]
     Broken(String),
 }
 

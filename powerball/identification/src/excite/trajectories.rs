@@ -174,8 +174,7 @@ fn check(arm: &Arm, options: &ExciteOptions<'_>) -> Result<(), Error> {
     let samples = options.rate * period * options.search.periods as f64;
     if samples > MOST_SAMPLES {
         return Err(Error::Setting(format!(
-            "--rate, --period and --periods make {samples:.0} samples: more than {MOST_SAMPLES} are no \
-                trajectory"
+            "--rate, --period and --periods make {samples:.0} samples: at most {MOST_SAMPLES} are allowed"
         )));
     }
     let clearance = options.collision.map_or(CLEARANCE, |c| c.clearance);
@@ -210,7 +209,7 @@ fn tasks<'m>(
         }
     };
     match options.collision {
-        None => assumed.push("floor and self-collision were not looked at".to_string()),
+        None => assumed.push("floor and self-collision were not checked".to_string()),
         Some(Collision { radius, clearance, .. }) => {
             assumed.push(format!(
                 "links are capsules of radius {radius} m along the frames of the file, {clearance} m clear \

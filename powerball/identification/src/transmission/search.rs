@@ -55,8 +55,8 @@ pub(super) fn base(evidence: &Evidence, joint: JointNumber) -> Result<FittedLaw,
     let all = evidence.of(|_| true);
     if noise_share(&all, evidence.noise) > NOISE {
         return Err(format!(
-            "what tau{joint} says beyond friction and inertia hardly rises above its noise: let the joint \
-             carry a load that changes"
+            "tau{joint} without friction and inertia hardly rises above its noise: let the joint carry a \
+                load that changes"
         ));
     }
     let no_fit = || format!("motor{joint} and tau{joint} do not fit together: check both columns");
@@ -66,8 +66,9 @@ pub(super) fn base(evidence: &Evidence, joint: JointNumber) -> Result<FittedLaw,
     let sure = whole.standard_errors(evidence, |_| true)[0] * critical(evidence, whole.columns.len());
     if left > UNRELATED || whole.ratio().abs() < sure || fit.ratio() * whole.ratio() <= 0.0 {
         return Err(format!(
-            "motor{joint} does not follow tau{joint}: {:.0} % of it stays on logs that were not fitted, with the \
-             ratio, rotor and friction that fit best. Is it this joint's motor, and is it measured?",
+            "motor{joint} does not follow tau{joint}: {:.0} % of it remains on logs that were not fitted, \
+                with the ratio, rotor and friction that fit best. Is it this joint's motor, and is it \
+             measured?",
             100.0 * left
         ));
     }

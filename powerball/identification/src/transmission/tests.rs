@@ -107,7 +107,7 @@ fn ratio_sign_friction_and_rotor_come_back() {
     }
     assert_eq!(effects(&all), []);
     // The last link's torque is that of its rotor alone, as a motor's would be.
-    assert!(all[5].sentence().contains("tau6 says beyond friction and inertia"), "{}", all[5].sentence());
+    assert!(all[5].sentence().contains("tau6 without friction and inertia"), "{}", all[5].sentence());
 }
 
 /// The wrist carries little: of its link torque's square noise is a good part, and a plain fit would find a

@@ -165,8 +165,8 @@ pub(super) fn saturation_notes(logs: &[Log], joint: usize, spans: &[Vec<[f64; 2]
     let note = |(log, spans): (&Log, &Vec<[f64; 2]>)| {
         let seconds: f64 = spans.iter().map(|[from, to]| to - from).sum();
         format!(
-            "{}: the torque of joint {} stays at the largest or least value of all logs for {seconds:.1} s in \
-             all: it was at its limit; these samples of the joint were left out",
+            "{}: the torque of joint {} stays at the largest or least value of all logs for {seconds:.1} s \
+                in total: it was at its limit; these samples of the joint were left out",
             log.file,
             joint + 1
         )

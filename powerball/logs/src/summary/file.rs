@@ -158,8 +158,8 @@ impl Summary {
         }
         let head: Head = serde_json::from_slice(head)
             .map_err(|e| SummaryError::Unreadable(format!("its first line is damaged: {e}")))?;
-        let hash =
-            u64::from_str_radix(&head.arm_hash, 16).map_err(|_| unreadable("its arm_hash is no number"))?;
+        let hash = u64::from_str_radix(&head.arm_hash, 16)
+            .map_err(|_| unreadable("its arm_hash is not a number"))?;
         let width = Columns { inertial: head.parameters.len() }.width();
         let joints = head.steepness.len();
         let (numbers, after) = numbers.split_at(head.bytes.min(numbers.len()));

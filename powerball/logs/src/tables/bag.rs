@@ -110,7 +110,7 @@ impl Parts {
                 Format::Mcap => ("MCAP", mcap(own, topics)),
                 Format::Rosbag => ("rosbag2", rosbag(own, topics)),
                 Format::Bag => ("ROS 1 bag", bag1(own, topics)),
-                _ => ("file", Err(io::Error::other("is no recording of topics: unpack it first"))),
+                _ => ("file", Err(io::Error::other("is not a recording of topics: unpack it first"))),
             };
             let wrong = read.map_err(|e| LogError::of_file(&file, kind, format!("cannot be read: {e}")))?;
             notes.extend(wrong.into_iter().map(|wrong| Finding::of_file(&file, kind, wrong)));

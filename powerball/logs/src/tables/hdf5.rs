@@ -140,7 +140,7 @@ fn cells(set: &Dataset) -> Result<Vec<String>, String> {
             let letters = set.read_u16().map_err(|e| e.to_string())?;
             Ok(String::from_utf16_lossy(&letters).trim_end().to_string())
         }
-        _ => Err("its cells are no texts".to_string()),
+        _ => Err("its cells are not text".to_string()),
     };
     set.dereference().map_err(|e| e.to_string())?.into_iter().map(text).collect()
 }

@@ -30,7 +30,7 @@ pub(crate) fn read(
     let error = |what: String| LogError::of_file(file, "LeRobot", what);
     let folder = dataset(path).ok_or_else(|| error(format!("has no {INFO}")))?;
     let text = std::fs::read(folder.join(INFO)).map_err(|e| error(format!("{INFO} cannot be read: {e}")))?;
-    let info: Value = serde_json::from_slice(&text).map_err(|e| error(format!("{INFO} is no JSON: {e}")))?;
+    let info: Value = serde_json::from_slice(&text).map_err(|e| error(format!("{INFO} is not JSON: {e}")))?;
     let files = numbered(&folder.join("data")).map_err(|e| error(format!("data/ cannot be read: {e}")))?;
     if files.is_empty() {
         return Err(error(
@@ -45,7 +45,7 @@ pub(crate) fn read(
             return Err(LogError::of_file(
                 &own,
                 "LeRobot",
-                "is no Parquet: fetch the data of the dataset (git lfs pull)",
+                "is not a Parquet file: fetch the data of the dataset (git lfs pull)",
             ));
         }
         let opened =
@@ -55,7 +55,7 @@ pub(crate) fn read(
     let episodes = reader.finish()?;
     let said = info["total_episodes"].as_u64();
     if let Some(said) = said.filter(|said| *said != episodes as u64) {
-        let what = format!("{INFO} counts {said} episodes, and {episodes} are there: those were read");
+        let what = format!("{INFO} lists {said} episodes, but {episodes} are there: these were read");
         notes.push(Finding::of_file(file, "LeRobot", what));
     }
     let fps = info["fps"].as_f64().map_or(String::new(), |fps| format!(" at {fps} Hz"));

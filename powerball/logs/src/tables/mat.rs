@@ -167,7 +167,7 @@ impl Found {
             }
             CELL => match texts(&mut own, count)? {
                 Some(texts) => keep(Values::Texts(texts), vec![count]),
-                None => self.left_out.push(format!("{name} (its cells are no texts)")),
+                None => self.left_out.push(format!("{name} (its cells are not text)")),
             },
             // Rows of letters: a text each, letter by letter down the columns.
             LETTERS => match own.numbers()? {

@@ -67,7 +67,8 @@ impl Memory {
         match needed <= self.allowed {
             true => Ok(()),
             false => Err(format!(
-                "it needs {} of memory, and a log may take {}: cut it, leave out what is no signal, or allow more with --memory",
+                "it needs {} of memory, and a log may take {}: cut it, leave out columns that are not \
+                    signals, or allow more with --memory",
                 size(needed),
                 size(self.allowed)
             )),
@@ -136,7 +137,8 @@ pub(crate) fn few_columns(count: usize) -> Result<(), String> {
     match count <= MOST_COLUMNS {
         true => Ok(()),
         false => Err(format!(
-            "{count} columns: a log has at most {MOST_COLUMNS}, and of an arm some dozens; write its own columns alone"
+            "{count} columns: a log has at most {MOST_COLUMNS}, and that of an arm some dozens; write only \
+                the columns of the arm"
         )),
     }
 }

@@ -240,7 +240,7 @@ fn dynamic_joint_state(mut message: Cdr<'_>, row: &mut Row<'_>) -> Stamp {
 /// `foxglove.JointStates`.
 fn json(message: &[u8], row: &mut Row<'_>) -> Stamp {
     let message: Value = serde_json::from_slice(message).map_err(|e| format!("is no JSON: {e}"))?;
-    let Value::Object(fields) = &message else { return Err("is no JSON object".into()) };
+    let Value::Object(fields) = &message else { return Err("is not a JSON object".into()) };
     let stamp = message.pointer("/header/stamp").or(message.get("timestamp"));
     let nanoseconds = |s: &Value| s.get("nanosec").or(s.get("nsec")).and_then(Value::as_f64);
     let parts = |s: &Value| Some(s.get("sec")?.as_f64()? + 1e-9 * nanoseconds(s)?);

@@ -44,11 +44,11 @@ mod table;
 pub(crate) mod text;
 
 /// Said of a format that this build leaves out; the command has few, which keeps it quick to build.
-#[allow(dead_code, reason = "a build with every format says it of none")]
+#[allow(dead_code, reason = "a build with every format does not use it")]
 pub(crate) const NOT_READ: &str =
     "this build does not read it: build with `--features formats`, which reads every format";
 /// As [`NOT_READ`], for a file that is to be written.
-#[allow(dead_code, reason = "as above")]
+#[allow(dead_code, reason = "a build with every format does not use it")]
 pub(crate) const NOT_WRITTEN: &str =
     "this build does not write it: build with `--features formats`, or name a .csv";
 

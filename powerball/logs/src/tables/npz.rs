@@ -76,7 +76,7 @@ fn array(name: &str, bytes: &[u8], memory: &mut Memory) -> Result<Vec<Result<Arr
         _ => return Err("is a .npy of an unknown version".into()),
     };
     let header = rest.get(start..start + length).ok_or("is torn")?;
-    let header = std::str::from_utf8(header).map_err(|_| "has a head that is no text")?;
+    let header = std::str::from_utf8(header).map_err(|_| "has a head that is not text")?;
     let after = |key: &str| {
         let (_, rest) = header.split_once(&format!("'{key}'")).ok_or(format!("its head lacks {key}"))?;
         Ok::<&str, String>(rest.trim_start_matches([':', ' ']))

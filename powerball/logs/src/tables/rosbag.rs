@@ -53,7 +53,7 @@ fn with_ending(path: &Path, ending: &str) -> PathBuf {
 /// The URI by which SQLite opens a file that does not change.
 fn uri(path: &Path) -> io::Result<String> {
     let path = std::path::absolute(path)?;
-    let path = path.to_str().ok_or_else(|| io::Error::other("its path is no Unicode: rename it"))?;
+    let path = path.to_str().ok_or_else(|| io::Error::other("its path is not Unicode: rename it"))?;
     let escaped = path.replace('%', "%25").replace('?', "%3f").replace('#', "%23").replace('\\', "/");
     let root = if escaped.starts_with('/') { "" } else { "/" };
     Ok(format!("file:{root}{escaped}?immutable=1"))
@@ -115,7 +115,7 @@ fn failed(error: rusqlite::Error) -> io::Error {
     let text = error.to_string();
     if let Some((_, table)) = text.split_once("no such table: ") {
         let table = table.split_whitespace().next().unwrap_or_default();
-        return io::Error::other(format!("an SQLite file without the table {table} is no rosbag2"));
+        return io::Error::other(format!("an SQLite file without the table {table} is not a rosbag2"));
     }
     match error.sqlite_error_code() {
         Some(ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase) => io::Error::other(format!(

@@ -129,7 +129,7 @@ pub(crate) fn read(
         });
     }
     if decimal_commas.get() {
-        findings.push(error(None, "numbers", "have decimal commas, and are read so".to_string()));
+        findings.push(error(None, "numbers", "have decimal commas, and are read as such".to_string()));
     }
     Ok(last_torn)
 }

@@ -141,7 +141,8 @@ impl TryFrom<String> for Mapped {
     type Error = String;
 
     fn try_from(text: String) -> Result<Mapped, String> {
-        let wrong = || format!("\"{text}\" is no object; \"6041\", \"60C1:1\" or \"6071/16\" are expected");
+        let wrong =
+            || format!("\"{text}\" is not an object; \"6041\", \"60C1:1\" or \"6071/16\" are expected");
         let (address, bits) = match text.split_once('/') {
             Some((address, bits)) => (address, Some(bits.parse().map_err(|_| wrong())?)),
             None => (text.as_str(), None),

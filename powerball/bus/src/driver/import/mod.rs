@@ -98,7 +98,7 @@ fn check(drive: &Dcf, arm: &Arm) -> Result<(), ImportError> {
         match drive.variables.get(&object) {
             Some(variable) if matches!(variable.access, Access::ReadWrite | Access::WriteOnly) => {}
             _ => {
-                let lacks = format!("no writable {object}, without which the driver may not run");
+                let lacks = format!("no writable {object}, which the driver needs");
                 return match object {
                     schunk::SYNC_TIMEOUT_FACTOR => {
                         mismatch(format!("sync_timeout_factor is SCHUNK's, and the DCF has {lacks}"))
@@ -141,7 +141,7 @@ fn mapping(drive: &Dcf, mapped: &[Mapped], what: &str) -> Result<Mapping, Import
             (None, Some(bits)) => bits,
             (None, None) => {
                 return mismatch(format!(
-                    "{what}: the DCF has no {}; tell its bits, as in \"6071/16\"",
+                    "{what}: the DCF has no {}; give its number of bits, as in \"6071/16\"",
                     item.object
                 ));
             }

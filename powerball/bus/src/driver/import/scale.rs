@@ -59,11 +59,12 @@ pub(super) fn counts_per_degree(
     let node = joint.node;
     match (joint.counts_per_degree, turn(drive, node)) {
         (Some(given), _) if !(given.is_finite() && given != 0.0) => {
-            Err(ImportError::Toml(format!("node {node}: counts_per_degree = {given} is no scale")))
+            Err(ImportError::Toml(format!("node {node}: counts_per_degree = {given} is not a scale")))
         }
         (Some(given), Some(turn)) if (given.abs() * 360.0 - turn.counts).abs() > ROUNDING * turn.counts => {
             let note = format!(
-                "counts_per_degree = {given} is {} counts a turn, the drive's file says {} ({}): the TOML counts",
+                "counts_per_degree = {given} is {} counts a turn, the drive's file says {} ({}): the value \
+                    of the TOML is used",
                 given.abs() * 360.0,
                 turn.counts,
                 turn.source
@@ -74,14 +75,16 @@ pub(super) fn counts_per_degree(
         (None, Some(turn)) if turn.counts >= FEWEST => {
             let degree = turn.counts / 360.0;
             let note = format!(
-                "counts_per_degree is not in the TOML; {} counts a turn are taken from the drive's file, {}. A gear that \
-                 the drive does not know, and a joint that the drive counts against, need counts_per_degree in [[joint]]",
+                "counts_per_degree is not in the TOML; {} counts a turn are taken from the drive's file, \
+                    {}. Give counts_per_degree in [[joint]] if there is a gear that the drive does not \
+                    know, or if the drive counts in the opposite direction",
                 turn.counts, turn.source
             );
             Ok((degree, Some(note)))
         }
         (None, Some(turn)) => Err(ImportError::Mismatch(format!(
-            "node {node}: {} counts a turn ({}) are no scale of a joint; give counts_per_degree in [[joint]]",
+            "node {node}: {} counts a turn ({}) are not a valid scale of a joint; give counts_per_degree in \
+                [[joint]]",
             turn.counts, turn.source
         ))),
         (None, None) => Err(ImportError::Toml(format!(

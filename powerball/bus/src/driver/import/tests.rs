@@ -105,7 +105,7 @@ fn modes_that_the_drive_lacks_are_left_out() {
     let without = made(&modes("0x41"), &lean).unwrap();
     assert!(without.contains("    velocity: None,\n") && without.contains("denominator: 1,\n"), "{without}");
     let unknown = made(&other, &lean.replace("interpolated", "spline")).unwrap_err().to_string();
-    assert!(unknown.contains("[mode.spline_position] is no mode"), "{unknown}");
+    assert!(unknown.contains("[mode.spline_position] is not a mode"), "{unknown}");
     let (before, _) = toml.split_once("[mode.profile_position]").unwrap();
     let none = format!("{before}[mode]\n[[joint]]{joints}");
     assert!(made(&other, &none).unwrap_err().to_string().contains("no mode"));

@@ -55,7 +55,10 @@ fn profile(out: &mut String, drive: &Dcf, arm: &Arm, constant: &str) -> Result<(
     line(format!("    node_heartbeat_ms: {},", arm.watch.node_heartbeat_ms));
     let known = MODES.map(|(name, _)| name);
     if let Some(unknown) = arm.mode.keys().find(|name| !known.contains(&name.as_str())) {
-        return wrong(format!("[mode.{unknown}] is no mode of the driver; {} are", known.join(", ")));
+        return wrong(format!(
+            "[mode.{unknown}] is not a mode of the driver, which has {}",
+            known.join(", ")
+        ));
     }
     let mut modes = Vec::new();
     for (name, bits) in MODES {
@@ -64,7 +67,7 @@ fn profile(out: &mut String, drive: &Dcf, arm: &Arm, constant: &str) -> Result<(
             (Ok(source), _) => modes.push((name, source)),
             (Err(why), Some(modes)) => {
                 say(&format!(
-                    "[mode.{name}] is left out: the drive has it not (0x6502 = 0x{modes:X}); {why}"
+                    "[mode.{name}] is left out: the drive does not have it (0x6502 = 0x{modes:X}); {why}"
                 ));
             }
             (Err(why), None) => return Err(why),
@@ -72,7 +75,10 @@ fn profile(out: &mut String, drive: &Dcf, arm: &Arm, constant: &str) -> Result<(
     }
     let has = |name: &str| modes.iter().any(|(mode, _)| *mode == name);
     if modes.is_empty() {
-        return wrong(format!("there is no mode that the drive has; the driver knows {}", known.join(", ")));
+        return wrong(format!(
+            "the file gives no mode that the drive has; the driver knows {}",
+            known.join(", ")
+        ));
     }
     for name in known {
         let source = modes.iter().find(|(mode, _)| *mode == name);

@@ -171,7 +171,7 @@ impl Slcan {
     }
 
     fn gone(&self, e: impl std::fmt::Display) -> BusError {
-        self.wrong(format_args!("the device is gone or fails: {e}"))
+        self.wrong(format_args!("the device was removed or fails: {e}"))
     }
 
     /// Whether bytes wait, or may come while they are read.

@@ -255,7 +255,7 @@ fn an_adapter_that_falls_silent_or_vanishes_is_an_error() {
     drop(end);
     let until = bus.now() + 10_000_000;
     let error = bus.receive(until).unwrap_err().to_string();
-    assert!(error.contains("the device is gone"), "{error}");
+    assert!(error.contains("the device was removed"), "{error}");
     assert!(bus.send(&frame(1)).is_err());
 }
 

@@ -87,7 +87,7 @@ impl Compare {
         let shown = path.display().to_string();
         let Some(arm) = arm else {
             return Err(Failure::Unusable(format!(
-                "{shown}: is no result of `powerball identify`; for a log or a summary give its arm with \
+                "{shown}: is not a result of `powerball identify`; for a log or a summary give its arm with \
                     --arm"
             )));
         };

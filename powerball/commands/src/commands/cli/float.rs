@@ -66,13 +66,14 @@ impl FloatCommand {
         }
         if !(0.0..=0.95).contains(&self.friction) {
             return Err(Failure::Unusable(format!(
-                "--friction {}: 0 to 0.95 can be; with more, friction that is less than the model's would drive the arm",
+                "--friction {}: give 0 to 0.95; with more, an arm with less friction than its model would \
+                    start to move by itself",
                 self.friction
             )));
         }
         let virtual_bus = self.on.place.bus == BusUrl::Virtual;
         if self.push.is_some() && !virtual_bus {
-            return Err(Failure::Unusable("--push is a hand for --bus virtual".to_string()));
+            return Err(Failure::Unusable("--push works only with --bus virtual".to_string()));
         }
         let (_, model, envelope) = self.on.read()?;
         let push = self.push.as_deref().map(read_push).transpose()?;
@@ -156,7 +157,8 @@ impl FloatCommand {
         if arm.carried_on() > 0 {
             let cycles = arm.carried_on();
             tracing::warn!(
-                "data of a joint was missing in {cycles} cycles: its state was carried on with its last velocity"
+                "data of a joint was missing in {cycles} cycles: its state was extrapolated with its last \
+                    velocity"
             );
         }
         arm.finish().map_err(refused)?;
@@ -173,7 +175,7 @@ fn read_push(file: &Path) -> Result<Motion, Failure> {
     let path = Motion::from_csv(&text, 6).map_err(|why| Failure::Unusable(format!("{name}: {why}")))?;
     if path.len() < 2 || path.period <= 0.0 {
         return Err(failed(
-            crate::procedure::RecordError::Motion("two samples at least are needed".into()),
+            crate::procedure::RecordError::Motion("at least two samples are needed".into()),
             file,
         ));
     }

@@ -45,7 +45,8 @@ enum With {
     powerball excite --arm demo/arm.toml --out path.csv\n  \
     powerball follow --trajectory path.csv --arm demo/arm.toml --model demo/model.json --plant demo/virtual_arm.json \
     --with torque --compare base --out followed\n\n\
-    The delay of drives that interpolate (the same for all joints and runs) is found and taken off the error.")]
+    The delay of drives that interpolate (the same for all joints and runs) is estimated and removed from \
+    the error.")]
 pub(crate) struct FollowCommand {
     /// The trajectory: CSV with t, q1…q6 (rad), as `powerball excite` writes it at the arm's rate.
     #[arg(long, value_name = "FILE")]
@@ -119,11 +120,12 @@ impl FollowCommand {
         let motion = Motion::from_csv(&text, LWA4P.joints.len())
             .map_err(|why| Failure::Unusable(format!("{name}: {why}")))?;
         if self.stop_at_contact && self.with == With::Feedforward {
-            let what = "--stop-at-contact needs --with torque or impedance: in interpolated position mode the drives' own loops press on";
+            let what = "--stop-at-contact needs --with torque or impedance: in interpolated position mode \
+                the drives' own loops keep pushing";
             return Err(Failure::Unusable(what.to_string()));
         }
         if !(0.0..=0.5).contains(&self.give) {
-            return Err(Failure::Unusable(format!("--give {}: 0 to 0.5 rad can be", self.give)));
+            return Err(Failure::Unusable(format!("--give {}: give 0 to 0.5 rad", self.give)));
         }
         let (arm, model, mut envelope) = self.on.read()?;
         let profile = match self.with {
@@ -306,7 +308,8 @@ impl FollowCommand {
         }
         for (name, cycles) in &result.carried_on {
             output::print(&format!(
-                "{name}: data of a joint was missing in {cycles} cycles; its state was carried on with its last velocity"
+                "{name}: data of a joint was missing in {cycles} cycles; its state was extrapolated with \
+                    its last velocity"
             ));
         }
     }

@@ -88,7 +88,7 @@ impl Friction {
                         found.mounting,
                         found.mounting.text()
                     ),
-                    None => format!("joint {}: no pose keeps gravity off it in any mounting", joint + 1),
+                    None => format!("joint {}: no pose in any mounting frees it from gravity", joint + 1),
                 }),
             }
         }
@@ -210,9 +210,9 @@ fn failure(e: FrictionError) -> Failure {
 fn page(arm: &str, found: &[JointFriction], notes: &[String]) -> Page {
     let mut page = Page::new(format!("Friction of {arm}"));
     page.lead(
-        "Mean torques at constant velocities where gravity does not load the joint. Laws are rated on \
-        velocities that were left out of their fit, both directions of a velocity together; of laws that cannot be \
-        distinguished tanh friction (Eq. 16) is taken.",
+        "Mean torques at constant velocities where gravity does not load the joint. Laws are compared on \
+            velocities that were left out of their fit, both directions of a velocity together. If laws \
+            cannot be distinguished, tanh friction (Eq. 16) is used.",
     );
     for note in notes {
         page.paragraph(note);

@@ -21,8 +21,8 @@ pub(super) fn listen(
     mut take: impl FnMut(&LiveSample),
 ) -> Result<(), Failure> {
     if *url == BusUrl::Virtual {
-        let what = "--bus virtual is within one program, where nobody else moves the arm. Use `powerball virtual-arm` on \
-            udp:239.74.163.2:43113";
+        let what = "--bus virtual exists within one program, so no other program moves its arm. Use \
+            `powerball virtual-arm` on udp:239.74.163.2:43113";
         return Err(Failure::Unusable(what.to_string()));
     }
     let interrupt = Interrupt::install().map_err(|e| Failure::Refused(e.to_string()))?;

@@ -129,7 +129,7 @@ impl Page {
                 (StatusCode::OK, "text/event-stream", Answer::Events(feed))
             }
             (None, _) => {
-                (StatusCode::NOT_FOUND, "text/plain", Answer::text("nothing is here; / is the page\n".into()))
+                (StatusCode::NOT_FOUND, "text/plain", Answer::text("not found; the page is at /\n".into()))
             }
         };
         let mut response = Response::new(answer);
@@ -162,14 +162,14 @@ impl Page {
         let mut named = request.headers().get_all(HOST).iter();
         let host = match (named.next().and_then(|host| host.to_str().ok()), named.next()) {
             (Some(host), None) if request.uri().authority().is_none() => host.to_ascii_lowercase(),
-            _ => return Some((StatusCode::FORBIDDEN, "one Host is needed, and none in the path")),
+            _ => return Some((StatusCode::FORBIDDEN, "exactly one Host is needed, and none in the path")),
         };
         if !self.hosts.contains(&host) {
-            return Some((StatusCode::FORBIDDEN, "this Host is not of this page"));
+            return Some((StatusCode::FORBIDDEN, "this Host does not belong to this page"));
         }
         let own = format!("http://{host}");
         if request.headers().get_all(ORIGIN).iter().any(|origin| origin.as_bytes() != own.as_bytes()) {
-            return Some((StatusCode::FORBIDDEN, "this Origin is not of this page"));
+            return Some((StatusCode::FORBIDDEN, "this Origin does not belong to this page"));
         }
         if request.uri().query() != Some(&self.query) {
             return Some((StatusCode::FORBIDDEN, "the token of the printed address is missing"));

@@ -95,7 +95,7 @@ impl LogCommand {
                 return unusable("--to mcap writes a file that ends in .mcap");
             }
             Target::Parquet if ending != "parquet" => {
-                return unusable("--to parquet writes one that ends in .parquet");
+                return unusable("--to parquet writes a file that ends in .parquet");
             }
             Target::Csv if ["mcap", "parquet"].contains(&ending.as_str()) => {
                 return unusable("--to csv writes a file that ends in .csv");
@@ -165,7 +165,7 @@ fn table_lines(table: &InspectedTable, lines: &mut Vec<String>) {
     }
     lines.push(line);
     if let Some(doubt) = &table.clock_doubt {
-        lines.push(format!("    time of receipt counts: {doubt}"));
+        lines.push(format!("    time of receipt is used: {doubt}"));
     }
     if let Some(delay) = table.delay {
         lines.push(format!("    received {:.1} ms after their time stamps (median)", 1e3 * delay));
@@ -175,7 +175,7 @@ fn table_lines(table: &InspectedTable, lines: &mut Vec<String>) {
         lines.push(format!("    {} gaps, the longest {longest:.3} s", table.gaps));
     }
     if table.not_rising > 0 {
-        lines.push(format!("    {} time stamps do not rise", table.not_rising));
+        lines.push(format!("    {} time stamps do not increase", table.not_rising));
     }
     if !table.joints.is_empty() {
         lines.push(format!("    joints: {}", table.joints.join(", ")));

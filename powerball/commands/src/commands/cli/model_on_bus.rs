@@ -38,9 +38,7 @@ impl ModelOnBus {
     /// The arm file and the model, and what motions must keep: with the model's masses where no values were given.
     pub(crate) fn read(&mut self) -> Result<(Arm, ModelArm, Envelope<6>), Failure> {
         if self.plant.is_some() && self.place.bus != BusUrl::Virtual {
-            return Err(Failure::Unusable(
-                "--plant is for --bus virtual; elsewhere the arm is what it is".into(),
-            ));
+            return Err(Failure::Unusable("--plant works only with --bus virtual".into()));
         }
         let arm = self.surroundings.arm()?;
         let model = model_arm::read(&arm, &self.model, true).map_err(Failure::Unusable)?;
@@ -86,8 +84,8 @@ impl ModelOnBus {
         match &file {
             Some(file) => eprintln!("powerball: the virtual arm is that of {}", file.display()),
             None => eprintln!(
-                "powerball: the virtual arm is the built-in one, which has no undeclared effect: it says nothing of a model \
-                    of another arm; --plant names that one's file"
+                "powerball: the virtual arm is the built-in one, which has no undeclared effect: it cannot \
+                    test a model of another arm; give the file of that arm with --plant"
             ),
         }
         let setup = match &file {

@@ -65,7 +65,7 @@ impl ProfileCommand {
 /// Why a TOML's bytes are no text.
 fn no_text(bytes: &[u8]) -> &'static str {
     match bytes {
-        [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] => "is UTF-16; TOML is UTF-8: save it as that",
+        [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] => "is UTF-16; TOML is UTF-8: save it as UTF-8",
         _ => "not UTF-8",
     }
 }

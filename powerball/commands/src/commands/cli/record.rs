@@ -65,7 +65,7 @@ impl RecordCommand {
         let (log, recovered) = LogFile::create_for(&self.out, &joint_names(&arm)).map_err(unwritable)?;
         if let Some(file) = &recovered {
             let file = file.display();
-            tracing::warn!("an earlier recording was broken off: its lines are now in {file}");
+            tracing::warn!("an earlier recording was interrupted: its lines are now in {file}");
         }
         let mut log = Behind::new(log);
         let done = record(master, &motion, envelope, output::live(), &mut log);

@@ -55,7 +55,7 @@ pub(super) fn check_log(target: &Path, inputs: &[&Path]) -> Result<(), Failure> 
     let same =
         |input: &&Path| matches!((input.canonicalize(), target.canonicalize()), (Ok(a), Ok(b)) if a == b);
     if inputs.iter().any(same) {
-        let reason = format!("{}: is what is read: choose another file", target.display());
+        let reason = format!("{}: is also an input: choose another file", target.display());
         return Err(Failure::Unusable(reason));
     }
     match target.is_file() && !FORCE.load(Ordering::Relaxed) {
@@ -66,7 +66,7 @@ pub(super) fn check_log(target: &Path, inputs: &[&Path]) -> Result<(), Failure> 
 
 fn refused(target: &Path) -> Failure {
     Failure::Unusable(format!(
-        "{}: is there already, and this command may not have made it; --force writes over it",
+        "{}: exists already, and this command may not have made it; --force overwrites it",
         target.display()
     ))
 }

@@ -44,7 +44,8 @@ impl Serve {
         let Some(address) = self.serve else { return Ok(Live { server: None, began }) };
         if !address.ip().is_loopback() {
             return Err(Failure::Unusable(format!(
-                "--serve {address}: pages are for this machine alone, 127.0.0.1 or [::1]; from another one take a tunnel (ssh -L)"
+                "--serve {address}: the page is only for this machine, 127.0.0.1 or [::1]; from another \
+                    machine use a tunnel (ssh -L)"
             )));
         }
         let failed = |e: &dyn std::fmt::Display| Failure::Unusable(format!("--serve {address}: {e}"));

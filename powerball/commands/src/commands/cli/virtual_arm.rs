@@ -54,7 +54,7 @@ impl VirtualArmCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         if self.bus == BusUrl::Virtual {
             return Err(Failure::Unusable(
-                "--bus virtual is within one program: others would not see the arm. Use \
+                "--bus virtual exists within one program: other programs would not see the arm. Use \
                     udp:239.74.163.2:43113"
                     .to_string(),
             ));

@@ -85,7 +85,7 @@ impl WarmUp {
             _ => {}
         }
         if start > 0.0 && !self.place.json {
-            output::print(&format!("going on with {} after {start:.0} s", path.display()));
+            output::print(&format!("continuing {} after {start:.0} s", path.display()));
         }
         let bus: Box<dyn Bus> = match self.place.bus {
             // A cold one, or there would be nothing to see; one that has been swung before is as warm as it

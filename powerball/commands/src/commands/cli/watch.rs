@@ -131,8 +131,8 @@ impl WatchCommand {
         let stale = match seen.stale {
             0 => String::new(),
             count => format!(
-                "{count} of {} samples have a time that does not rise and were left out: give the times at which samples \
-                 were taken",
+                "{count} of {} samples have a time that does not increase and were left out: give the times \
+                    at which samples were taken",
                 count + seen.samples
             ),
         };
@@ -145,7 +145,7 @@ impl WatchCommand {
         let joints = seen.joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
         if seen.joints.is_empty() && seen.events == 0 {
             return Err(Failure::Doubtful(format!(
-                "no joint was watched in {:.0} s: it is not known how much the model leaves where it holds",
+                "no joint was watched in {:.0} s: the residual of the unchanged arm is not known",
                 seen.seconds
             )));
         }
@@ -264,7 +264,7 @@ impl WatchCommand {
                 Some(Taken::Sample { sample, restarted }) => {
                     if restarted {
                         tracing::warn!(
-                            "{NAME}: line {}: the clock restarts: times go on from here",
+                            "{NAME}: line {}: the clock restarts: times continue from here",
                             number + 1
                         );
                     }
@@ -402,7 +402,7 @@ impl Format {
 /// The numbers of a JSON object; those of a list are named by their places, from 1.
 fn numbers(line: &str) -> Result<Vec<(String, f64)>, String> {
     let object: serde_json::Map<String, serde_json::Value> =
-        serde_json::from_str(line).map_err(|e| format!("is no JSON object: {e}"))?;
+        serde_json::from_str(line).map_err(|e| format!("is not a JSON object: {e}"))?;
     let mut all = Vec::new();
     for (name, value) in object {
         match value {

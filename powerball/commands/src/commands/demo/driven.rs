@@ -153,5 +153,5 @@ fn path(
             Err(what) => why = what,
         }
     }
-    Err(DemoError::Drive(format!("of {PATHS} paths none is within the joints' torques: {why}")))
+    Err(DemoError::Drive(format!("none of {PATHS} paths is within the joints' torques: {why}")))
 }

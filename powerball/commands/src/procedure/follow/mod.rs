@@ -76,8 +76,8 @@ impl<const N: usize> Law<N> {
             let inertia = arm.mass_matrix(&q);
             if inertia.cholesky().is_none() {
                 return Err(format!(
-                    "the model's mass matrix is not positive definite at ({}) rad, so it is no arm's: `powerball consistent` \
-                        finds the nearest values that an arm can have",
+                    "the model's mass matrix is not positive definite at ({}) rad, so it is not that of an \
+                        arm: `powerball consistent` finds the nearest values that an arm can have",
                     listed(&q)
                 ));
             }

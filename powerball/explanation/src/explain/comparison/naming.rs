@@ -55,7 +55,7 @@ pub(crate) fn compare(
             let alike = own / score < rule.least_margin;
             let why_not = if alike {
                 format!(
-                    "fits as well within {:.0} %: these logs do not tell the two apart",
+                    "fits as well within {:.0} %: these logs cannot distinguish the two",
                     100.0 * (rule.least_margin - 1.0)
                 )
             } else {

@@ -27,13 +27,13 @@ pub(crate) fn withhold(study: &Study<'_>, model: &mut Model, history: &mut Histo
     let (taken, why) = if let Some(a) = impossible(study, model) {
         (vec![model.accepted.remove(a)], IMPOSSIBLE)
     } else if let Some(a) = inconstant(study, model) {
-        (vec![model.accepted.remove(a)], "it is not there at every pace of motion")
+        (vec![model.accepted.remove(a)], "it is not there at every speed of motion")
     } else if let Some(a) = harmful(study, model) {
         (vec![model.accepted.remove(a)], HARMS)
     } else {
         let step = history.steps.iter().rev().find(|s| is_weak(study, model, s))?.number;
         let taken = model.accepted.extract_if(.., |a| a.step() == Some(step)).collect();
-        (taken, "others fit as well and much is left")
+        (taken, "other effects fit as well, and much of the error is left")
     };
     take_back(study, model, history, taken, why)
 }
@@ -53,9 +53,9 @@ pub(crate) fn withhold_harmful(
 }
 
 /// Why something goes out that cannot be as it would have to be.
-const IMPOSSIBLE: &str = "its figures cannot be";
+const IMPOSSIBLE: &str = "its values are impossible";
 /// Why something goes out that makes the error on the logs to judge on larger.
-const HARMS: &str = "with it the error on the logs to judge on is larger";
+const HARMS: &str = "with it the error on the validation logs is larger";
 
 fn take_back(
     study: &Study<'_>,

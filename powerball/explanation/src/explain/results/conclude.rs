@@ -243,11 +243,11 @@ fn changes(data: &Data<'_>, before: &[Vec<f64>], after: &[Vec<f64>]) -> Vec<Chan
 // What these logs cannot show, and what to record instead.
 
 /// Said where each joint was fitted by itself.
-const PER_JOINT: &str = "the logs repeat one path, and joints by themselves predict the held-out logs \
-    better than a rigid body that all joints share: each joint was given inertial parameters of its own, \
-    an offset and a slope with its position, all errors here are of that model, and effects of the body \
-    (payload, base tilt, broken symmetries) were not considered; model.json holds one body for all, whose \
-    errors are larger";
+const PER_JOINT: &str = "the logs repeat one path, and separate models of the joints predict the held-out \
+    logs better than one rigid body for all joints: each joint was given inertial parameters of its own, an \
+    offset and a slope with its position. All errors here are of these models, and effects of the body \
+    (payload, base tilt, broken symmetries) were not considered; model.json holds one body for all joints, \
+    whose errors are larger";
 /// Said where the logs to judge on are repeats.
 const ONE_PATH: &str = "the logs of --validate run the same path as those of --log: what depends on \
     positions (springs, zeros, gravity, broken symmetries, slow ripple) was not considered; record another \
@@ -280,8 +280,8 @@ pub(crate) fn warnings(findings: &Findings<'_>) -> Vec<String> {
     let seconds = study.fitted_time();
     if seconds < rule.least_time {
         warnings.push(format!(
-            "the logs to fit hold {seconds:.0} s: too little to tell small effects from chance; record \
-             several paths of 20 s or more"
+            "the logs to fit hold {seconds:.0} s: too little to distinguish small effects from chance; \
+                record several paths of 20 s or more"
         ));
     }
     if study.data.per_joint {
@@ -294,9 +294,9 @@ pub(crate) fn warnings(findings: &Findings<'_>) -> Vec<String> {
     let chance = &findings.false_positives;
     if chance.accepted as f64 > rule.many_accepted * chance.surrogates as f64 && chance.accepted > FEW {
         warnings.push(format!(
-            "{} of {} effects that cannot be there were accepted: what the model leaves on these logs is \
-             large and smooth, and names given here may be wrong; see what is unattributed, and whether \
-             the logs and the arm file belong together",
+            "false positives: {} of {} time-shifted surrogates were accepted. The error that remains on \
+                these logs is large and smooth, and names given here may be wrong; see the unattributed \
+                part, and check that the logs and the arm file belong together",
             chance.accepted, chance.surrogates
         ));
     }

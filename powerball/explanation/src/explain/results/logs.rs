@@ -213,7 +213,7 @@ impl LogResult {
             return format!("{}: like the others", self.log);
         }
         if self.differs.is_empty() {
-            return format!("{}: differs, and nothing that was tried says why:{}", self.log, ratio(""));
+            return format!("{}: differs, and no cause that was tested explains it:{}", self.log, ratio(""));
         }
         let of = |d: &Difference| {
             let joints: Vec<String> = d.joints.iter().map(ToString::to_string).collect();

@@ -73,12 +73,13 @@ pub(crate) fn unattributed(
     });
     let mut unexplained = Vec::new();
     if !little.is_empty() {
-        unexplained.push(format!("what little is left depends on {}", little.join(", ")));
+        unexplained.push(format!("the small remaining error depends on {}", little.join(", ")));
     }
     if !nothing.is_empty() {
         unexplained.push(format!(
-            "what stays on joint {} is slower than white noise and depends on no position, velocity, \
-             acceleration, load or time: slow noise of the sensor, or something that comes and goes",
+            "the remaining error of joint {} is slower than white noise and depends on no position, \
+                velocity, acceleration, load or time: slow noise of the sensor, or a cause that comes and \
+                goes",
             nothing.join(", ")
         ));
     }

@@ -71,8 +71,8 @@ pub(crate) fn verdict(
     let of = |j: usize| {
         let joint = JointNumber::from_index(j);
         if study.validation.joints[j].is_empty() {
-            let advice = "it does not move in the logs to judge on, or its torque says nothing there: record a \
-                motion that moves it";
+            let advice = "it does not move in the validation logs, or its torque carries no information \
+                there: record a motion that moves it";
             let state = State::NotPredicted;
             return Verdict { joint, state, left: f64::NAN, advice: advice.to_string() };
         }
@@ -112,21 +112,22 @@ fn advice(study: &Study<'_>, j: usize, left: f64, over_noise: f64, dependencies:
     let mut parts: Vec<String> = Vec::new();
     if left > study.rule().nothing_share {
         parts.push(
-            "the model predicts next to nothing of this torque on other paths: check the column's sign, unit \
-             and order, that the arm file is this arm's, and that the logs excite it"
+            "the model predicts almost nothing of this torque on other paths: check the sign, unit and \
+                order of the column, that the arm file belongs to this arm, and that the logs excite the \
+                joint"
                 .to_string(),
         );
     }
     match dependencies.of(j) {
-        [] if over_noise < 3.0 => parts.push("what is left is little more than noise".to_string()),
+        [] if over_noise < 3.0 => parts.push("the remaining error is little more than noise".to_string()),
         [] => parts.push(
-            "what is left depends on no signal of the logs: slow noise of the sensor, something that comes and \
-             goes, or a model whose parameters these logs do not hold"
+            "the remaining error depends on no signal of the logs: slow noise of the sensor, a cause that \
+                comes and goes, or a model whose parameters these logs do not determine"
                 .to_string(),
         ),
         signals => {
             let names: Vec<&str> = signals.iter().take(3).map(|(name, _)| name.as_str()).collect();
-            parts.push(format!("what is left depends on {}: {}", names.join(", "), kind(signals, j)));
+            parts.push(format!("the remaining error depends on {}: {}", names.join(", "), kind(signals, j)));
         }
     }
     let seconds = study.fitted_time();

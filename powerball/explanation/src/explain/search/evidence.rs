@@ -355,7 +355,7 @@ pub(crate) fn refusal(rule: &Rule, evidence: &Evidence, tests: f64, local: bool)
     if let Some(left) = evidence.event_left.filter(|left| *left > rule.event_left) {
         return Some(match left.is_finite() {
             true => {
-                format!("leaves {:.0} % of what its time has more than others of squared error", 100.0 * left)
+                format!("leaves {:.0} % of the additional squared error of its time", 100.0 * left)
             }
             false => "its time has no larger error than others".to_string(),
         });

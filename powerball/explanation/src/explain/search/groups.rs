@@ -223,7 +223,7 @@ fn untested_refusal(
         return Some((format!("explains too little (score {:.1})", member.trial.score), true));
     }
     if study.one_path && candidate.effect().is_function_of_path(candidate, &study.data, rule) {
-        let why = "the logs to judge on run the same path: a function of the path cannot be distinguished \
+        let why = "the validation logs run the same path: a function of the path cannot be distinguished \
             there from any other misfit; record another path";
         return Some((why.to_string(), false));
     }
@@ -231,7 +231,7 @@ fn untested_refusal(
         return Some((TAKEN_BACK.to_string(), true));
     }
     if let Some(name) = would_absorb(model, screen, member) {
-        return Some((format!("gains too little to take the place of {name}"), true));
+        return Some((format!("gains too little to replace {name}"), true));
     }
     only_corrects(model, screen, member).map(|name| (format!("only corrects the law of {name}"), true))
 }

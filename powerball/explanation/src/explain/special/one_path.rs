@@ -87,14 +87,13 @@ impl Clock {
         match self {
             Clock::AsGiven => None,
             Clock::InBetween => Some(
-                "the times of the logs start anew in each file: those of --validate are taken to have been \
-                    recorded in between those of --log, because \
-                 what warms up fits that better than their order does",
+                "the times restart in each file: the logs of --validate are taken to have been recorded in \
+                    between those of --log, because warming fits that order better than the order given",
             ),
             Clock::ColdSeries => Some(
-                "the times of the logs start anew in each file: every series of runs from the same start is \
-                    taken to have started with a cold arm, \
-                 because what warms up fits that better than one running time through all files does",
+                "the times restart in each file: every series of runs from the same start is taken to have \
+                    started with a cold arm, because warming fits that better than one running time through \
+                    all files",
             ),
         }
     }

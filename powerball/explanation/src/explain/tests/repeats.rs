@@ -60,7 +60,7 @@ fn even_to_odd(logs: Vec<Log>) -> Explained {
 }
 
 fn fitted_per_joint(explained: &Explained) -> bool {
-    explained.warnings.iter().any(|w| w.contains("joints by themselves"))
+    explained.warnings.iter().any(|w| w.contains("separate models of the joints"))
 }
 
 #[test]

@@ -158,8 +158,10 @@ impl Dcf {
         };
         for (key, sub) in section.listed()? {
             let Some(variable) = self.variables.get_mut(&Object::new(index, sub)) else {
-                let message =
-                    format!("[{}] lists {sub}, which 0x{index:04X} has not (CompactSubObj)", section.name);
+                let message = format!(
+                    "[{}] lists {sub}, which 0x{index:04X} does not have (CompactSubObj)",
+                    section.name
+                );
                 return Err(DcfError { line: section.line_of(key), message });
             };
             if is_name {
@@ -179,7 +181,7 @@ impl Dcf {
     pub fn overlay(&mut self, overlay: &Dcf) -> Result<(), DcfError> {
         for (object, variable) in &overlay.variables {
             let Some(own) = self.variables.get_mut(object) else {
-                let message = format!("the overlay sets {object}, which the drive has not");
+                let message = format!("the overlay sets {object}, which the drive does not have");
                 return Err(DcfError { line: variable.line, message });
             };
             let value = variable.value.as_ref().or(variable.default.as_ref());

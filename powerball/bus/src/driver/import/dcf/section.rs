@@ -239,8 +239,10 @@ impl Section {
                 (Some(sub), _) => Ok((key.as_str(), sub as u8)),
                 (None, entry) => {
                     let line = entry.map_or(self.line, |(line, _)| *line);
-                    let message =
-                        format!("\"{key}\" of [{}] is no sub-index; 1 to {LAST_SUB} is expected", self.name);
+                    let message = format!(
+                        "\"{key}\" of [{}] is not a sub-index; 1 to {LAST_SUB} is expected",
+                        self.name
+                    );
                     Err(DcfError { line, message })
                 }
             }

@@ -91,8 +91,8 @@ impl Where {
         if self.bus != BusUrl::Virtual {
             if let BusUrl::Udp(_, Some(interface)) = &self.bus {
                 tracing::warn!(
-                    "whoever reaches the network of {interface} can read this bus and move the arm; \
-                        docs/bus.md says how to fence it"
+                    "anyone on the network of {interface} can read this bus and move the arm; docs/bus.md \
+                        says how to restrict access"
                 );
             }
             return transport::open(&self.bus).map_err(|e| Failure::Unusable(e.to_string()));
@@ -159,7 +159,7 @@ impl Where {
         });
         let failed = |e| {
             tracing::warn!(
-                "no watchdog: {e}; where this program is killed, the drives' own monitoring alone stops the arm"
+                "no watchdog: {e}; if this program is killed, only the drives' own monitoring stops the arm"
             );
         };
         started.map_err(failed).ok()

@@ -15,7 +15,7 @@ use serde_json::json;
 #[command(
     after_help = "Examples:\n  powerball bus sdo read 3 0x6041\n  powerball bus sdo read 3 0x1018:1 --json\n  \
     powerball bus sdo write 3 0x200E 6\n\nNumbers are decimal or 0x… The type is that of the drive's DCF; \
-    --type says another."
+    --type sets another."
 )]
 pub(crate) struct Sdo {
     #[command(subcommand)]
@@ -137,7 +137,7 @@ impl Write {
             },
         };
         let value = encode(&self.value, kind).map_err(|why| {
-            Failure::Unusable(format!("\"{}\" is no value for {object}: {why}", self.value))
+            Failure::Unusable(format!("\"{}\" is not a value for {object}: {why}", self.value))
         })?;
         blocking::write(&mut *bus, node, object, value)?;
         show(&self.address, &value, &self.place);
