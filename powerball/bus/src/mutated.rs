@@ -1,6 +1,6 @@
-//! Random and mutated bytes into everything that reads a bus or a drive's file, a fixed number of times with a fixed
-//! seed: nothing panics, and what is taken is taken for what it says. `fuzz/` holds the same readers for as long as
-//! one likes.
+//! Random and mutated bytes into everything that reads a bus or a drive's file, a fixed number of times with
+//! a fixed seed: nothing panics, and accepted bytes are read with the right meaning. `fuzz/` holds the same
+//! readers for as long as one likes.
 
 use super::canopen::emcy::Emcy;
 use super::canopen::pdo::Mapping;

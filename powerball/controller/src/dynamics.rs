@@ -118,7 +118,7 @@ pub struct State<T, const N: usize> {
     pub dq: SVector<T, N>,
 }
 
-/// What the joints shall do: rad, rad/s, rad/s².
+/// Reference motion of the joints: position, rad; velocity, rad/s; acceleration, rad/s².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reference<T, const N: usize> {
     /// q_r.

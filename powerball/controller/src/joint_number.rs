@@ -1,4 +1,4 @@
-//! Which joint of an arm is meant.
+//! The number of a joint in its arm.
 
 use core::fmt;
 

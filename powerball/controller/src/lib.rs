@@ -1,8 +1,9 @@
-//! What runs in the control loop of an arm: no `std`, no allocation, no panic.
+//! Code for the control loop of an arm: no `std`, no allocation, no panic.
 //!
 //! # A model in a control step
 //!
-//! Of the LWA 4P (feature `lwa4p`) here; `powerball generate` writes the same for any arm, with every effect that was named.
+//! This example uses the LWA 4P (feature `lwa4p`); `powerball generate` writes such a model for any arm, with
+//! every effect that was named.
 //!
 #![cfg_attr(feature = "lwa4p", doc = "```")]
 #![cfg_attr(not(feature = "lwa4p"), doc = "```ignore")]

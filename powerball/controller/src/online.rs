@@ -1,4 +1,5 @@
-//! Least squares that runs along, for controllers, in square-root form: no allocation, no clock, constant time for each row.
+//! Recursive least squares for controllers, in square-root form: no allocation, no clock, constant time for
+//! each row.
 
 use nalgebra::{RealField, SMatrix, SVector};
 

@@ -41,14 +41,14 @@ impl Value {
         self.bytes.get(..self.len).unwrap_or(&self.bytes)
     }
 
-    /// As an unsigned number, where it has one to four bytes.
+    /// The value as an unsigned number, if it has one to four bytes.
     pub fn unsigned(&self) -> Option<u32> {
         let bytes = self.as_slice();
         matches!(bytes.len(), 1..=4)
             .then(|| bytes.iter().rev().fold(0, |sum, byte| sum << 8 | u32::from(*byte)))
     }
 
-    /// As a signed number, where it has one to four bytes.
+    /// The value as a signed number, if it has one to four bytes.
     pub fn signed(&self) -> Option<i32> {
         self.unsigned().map(|raw| super::pdo::sign_extend(raw, self.len as u8 * 8))
     }
@@ -76,7 +76,7 @@ pub enum SdoError {
     Aborted(AbortCode),
     /// The node did not answer in time.
     Timeout,
-    /// The node answered what it should not; this side gave up with the code.
+    /// The node sent a wrong answer; the client ended the transfer with this abort code.
     Protocol(AbortCode),
 }
 
@@ -92,7 +92,7 @@ impl fmt::Display for SdoError {
 
 impl core::error::Error for SdoError {}
 
-/// What a call led to.
+/// The result of a call: a frame to send, and whether the transfer has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Step {
     /// To be sent now.
@@ -183,7 +183,7 @@ impl Client {
         self.give_up(AbortCode::TIMEOUT, SdoError::Timeout)
     }
 
-    /// A received frame; frames of others are ignored, and so are answers when nothing was asked.
+    /// Takes a received frame. Frames of other nodes are ignored, and so are answers without a request.
     pub fn receive(&mut self, frame: &Frame, now: Micros) -> Step {
         if self.is_idle() || Cob::of(frame) != Some(Cob::SdoResponse(self.node)) {
             return Step::NOTHING;

@@ -40,7 +40,7 @@ impl fmt::Display for NodeId {
     }
 }
 
-/// What a frame is, by its identifier, in the predefined connection set. "T" and "R" are the node's view.
+/// The type of a frame, by its identifier in the predefined connection set. "T" and "R" are the node's view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Cob {
     /// Network management command of the master.
@@ -89,7 +89,7 @@ impl Cob {
         }
     }
 
-    /// What identifier `id` carries, or `None` where the set does not say.
+    /// The message type of identifier `id`, or `None` if the set does not define it.
     pub const fn from_id(id: u16) -> Option<Cob> {
         let Some(node) = NodeId::new((id & 0x7F) as u8) else {
             return match id {
@@ -110,7 +110,7 @@ impl Cob {
         })
     }
 
-    /// What `frame` is.
+    /// The message type of `frame`.
     pub const fn of(frame: &Frame) -> Option<Cob> {
         Cob::from_id(frame.raw_id())
     }

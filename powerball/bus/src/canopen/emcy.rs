@@ -45,8 +45,8 @@ impl fmt::Display for Emcy {
     }
 }
 
-/// What a code means: CiA 301 and CiA 402, the more specific first. 0x3222 is what this arm sends most: its
-/// supply sags.
+/// The meaning of a code of CiA 301 or CiA 402, the more specific first. This arm sends 0x3222 most often:
+/// its supply voltage sags.
 pub const fn text(code: u16) -> &'static str {
     match code {
         0x0000 => "error gone",
@@ -128,7 +128,7 @@ pub const fn vendor_status(register: u32) -> (u8, VendorClass) {
     (code, class)
 }
 
-/// What SCHUNK's code (0x70 … 0xED in errors) means, or `None` where nobody has published it.
+/// The meaning of SCHUNK's own code (0x70 … 0xED in errors), or `None` if it was never published.
 ///
 /// The list of names is public in MobileRobots/libPowerballArm, `schunkErrors.h`; the words are ours.
 pub const fn vendor_text(code: u8) -> Option<&'static str> {

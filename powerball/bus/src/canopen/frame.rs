@@ -35,7 +35,7 @@ impl Frame {
         }
     }
 
-    /// This frame as another crate's; `None` where that crate refuses it.
+    /// Converts this frame to the type of another crate; `None` if that crate refuses it.
     pub fn to_can<F: embedded_can::Frame>(&self) -> Option<F> {
         F::new(StandardId::new(self.id)?, self.bytes())
     }

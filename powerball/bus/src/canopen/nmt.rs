@@ -3,7 +3,7 @@
 use super::{Cob, Frame, NodeId};
 use core::fmt;
 
-/// What the master tells a node to be.
+/// A command of the master: the state that a node has to enter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Command {
     /// To operational: PDOs run.
@@ -60,10 +60,10 @@ impl Command {
     }
 }
 
-/// What a node says that it is, in its heartbeat.
+/// The state that a node reports in its heartbeat.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum State {
-    /// Said once after a reset.
+    /// Reported once after a reset.
     BootUp,
     /// Stopped.
     Stopped,

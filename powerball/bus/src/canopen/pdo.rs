@@ -6,7 +6,7 @@ use core::fmt;
 /// One mapped object with its size: the u32 of the mapping objects 0x1600 … and 0x1A00 ….
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Entry {
-    /// What is mapped.
+    /// The mapped object.
     pub object: Object,
     /// The object's size in bits: 8, 16, 24 or 32 on this arm (granularity 8).
     pub bits: u8,
@@ -18,7 +18,7 @@ impl Entry {
         Entry { object, bits }
     }
 
-    /// As the mapping object holds it: index, sub-index, bits from the top.
+    /// The entry as the mapping object stores it: index, sub-index and number of bits, from the top.
     pub const fn to_u32(self) -> u32 {
         (self.object.index as u32) << 16 | (self.object.sub as u32) << 8 | self.bits as u32
     }
@@ -92,8 +92,8 @@ impl Mapping {
         if mapping.len() > 8 { Err(MappingError::TooLong) } else { Ok(mapping) }
     }
 
-    /// For constant tables: a mapping of `entries`, or none where they do not fit (the driver refuses a
-    /// profile whose mapping lacks what it needs).
+    /// A mapping of `entries`, for constant tables. It is empty if they do not fit, and the driver refuses a
+    /// profile whose mapping lacks an object that it needs.
     pub const fn of(entries: &[Entry]) -> Mapping {
         match Mapping::new(entries) {
             Ok(mapping) => mapping,

@@ -48,7 +48,7 @@ pub enum Transfer {
 pub enum Request {
     /// Write `object`.
     Download {
-        /// What is written.
+        /// The object to write.
         object: Object,
         /// The object's value, or that segments follow.
         transfer: Transfer,
@@ -64,7 +64,7 @@ pub enum Request {
     },
     /// Read `object`.
     Upload {
-        /// What is read.
+        /// The object to read.
         object: Object,
     },
     /// Ask for the next bytes of a segmented read.
@@ -86,24 +86,24 @@ pub enum Request {
 pub enum Response {
     /// The write is done, or its segments may come.
     Download {
-        /// What is written.
+        /// The object that was written.
         object: Object,
     },
     /// The segment is taken.
     DownloadSegment {
-        /// As in the request.
+        /// The toggle bit of the request.
         toggle: bool,
     },
-    /// The value, or that it comes in segments.
+    /// Answer to an upload: the value, or the announcement of segments.
     Upload {
-        /// What is read.
+        /// The object that is read.
         object: Object,
         /// The object's value, or that segments follow.
         transfer: Transfer,
     },
     /// The next bytes of a segmented read.
     UploadSegment {
-        /// As in the request.
+        /// The toggle bit of the request.
         toggle: bool,
         /// The bytes.
         chunk: Chunk,
@@ -276,9 +276,9 @@ impl AbortCode {
     pub const VALUE: AbortCode = AbortCode(0x0609_0030);
     /// General error.
     pub const GENERAL: AbortCode = AbortCode(0x0800_0000);
-    /// Not possible because of local control.
+    /// Abort code: data cannot be transferred because of local control.
     pub const LOCAL_CONTROL: AbortCode = AbortCode(0x0800_0021);
-    /// Not possible in the device's present state.
+    /// Abort code: data cannot be transferred in the device's present state.
     pub const DEVICE_STATE: AbortCode = AbortCode(0x0800_0022);
 
     /// The code in words.

@@ -1,5 +1,5 @@
-//! SYNC and heartbeats in time: when to send, what was late, who is silent. It is given the time and never
-//! reads a clock.
+//! SYNC and heartbeats in time: when to send, what was late, who is silent. The caller gives the time; no
+//! clock is read.
 
 use super::Micros;
 use core::num::NonZeroU64;
@@ -105,7 +105,7 @@ pub struct HeartbeatConsumer {
 }
 
 impl HeartbeatConsumer {
-    /// Not watching; silence longer than `timeout` will be a loss.
+    /// A consumer that does not watch yet; later, silence longer than `timeout` counts as a loss.
     pub const fn new(timeout: Micros) -> HeartbeatConsumer {
         HeartbeatConsumer { timeout, last: None }
     }

@@ -1,4 +1,4 @@
-//! The drive profile's objects that this arm has (0x6000 …).
+//! The objects of the drive profile (0x6000 …) that this arm has.
 
 use crate::canopen::Object;
 

@@ -168,7 +168,7 @@ impl Controlword {
         })
     }
 
-    /// With `bits` set.
+    /// This controlword with `bits` set as well.
     #[must_use]
     pub const fn with(self, bits: u16) -> Controlword {
         Controlword(self.0 | bits)

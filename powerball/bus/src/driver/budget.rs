@@ -2,7 +2,7 @@
 //!
 //! A classic frame with an 11-bit identifier and n bytes has 47 + 8n bits with its pause; stuffing adds up to
 //! ⌊(33 + 8n)/4⌋. A cycle of SYNC, one receive PDO and the transmit PDOs of every node must fit into the SYNC
-//! period, with room for heartbeats, which are counted in. Above 100 % of the worst case the driver refuses
+//! period, and so must the heartbeats, which are included. Above 100 % of the worst case the driver refuses
 //! to start; above [`WARN_ABOVE`] it warns.
 
 use super::profile::{ModeProfile, Profile};
@@ -29,7 +29,7 @@ pub const fn worst_bits(bytes: usize) -> u32 {
 pub struct Bits {
     /// Without stuffing.
     pub nominal: u32,
-    /// With the most stuffing.
+    /// Number of bits with the most stuffing.
     pub worst: u32,
 }
 
@@ -51,29 +51,29 @@ pub fn cycle_bits(nodes: u32, lengths: impl IntoIterator<Item = usize>) -> Bits 
     used.fold(Bits::frames(1, 0), |sum, bytes| sum.plus(Bits::frames(nodes, bytes)))
 }
 
-/// What a profile needs in one mode.
+/// The bus load of a profile in one mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Budget {
     /// bit/s.
     pub bitrate: u32,
     /// µs.
     pub period: Micros,
-    /// Of one cycle.
+    /// Bits of one cycle.
     pub cycle: Bits,
-    /// Of the receive PDOs of one cycle.
+    /// Bits of the receive PDOs of one cycle.
     pub setpoints: Bits,
-    /// Of the heartbeats of one second.
+    /// Bits of the heartbeats of one second.
     pub heartbeats: Bits,
 }
 
-/// What to do with a budget.
+/// Whether a budget fits the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// It fits.
+    /// The load fits the bus.
     Fits,
-    /// It fits in the worst case with little room: no retransmission, no SDO.
+    /// The load fits in the worst case, but without a reserve for retransmissions or SDO.
     Tight,
-    /// It does not fit in the worst case.
+    /// The load does not fit in the worst case.
     TooMuch,
 }
 

@@ -1,6 +1,6 @@
 //! Why the arm was stopped, or may not start: typed, with the node and what was seen.
 //!
-//! Also here: why a set-point does not leave.
+//! [`Rejection`] says why a set-point is not sent.
 
 use super::receive::Foreign;
 use super::torque::ControlMode;
@@ -13,7 +13,7 @@ use crate::cia402::{Mode, State, Statusword};
 use core::fmt;
 use powerball_controller::JointNumber;
 
-/// What a statusword gives as the reason that a transition did not happen.
+/// The reason for a missing transition, as the statusword gives it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Hindrance {
     /// The node sends no process data.
@@ -75,7 +75,7 @@ impl fmt::Display for Hindrance {
 /// Why the arm was stopped, or could not be made ready. The first one is latched until it is acknowledged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cause {
-    /// Another master is on the bus: what it was heard to send.
+    /// Another master is on the bus: the kind of frame that was received from it.
     OtherMaster(Foreign),
     /// Process data of a node comes twice: two nodes have its id.
     TwoNodes(NodeId),
@@ -153,7 +153,7 @@ pub enum Cause {
     NoWatch(NodeId, Object, SdoError),
     /// An object reads back otherwise than written: written, read.
     NotTaken(NodeId, Object, u32, u32),
-    /// A drive's value makes no sense: the object, what it reads.
+    /// An object of a drive has an invalid value: the object and the value.
     Implausible(NodeId, Object, u32),
     /// A transition did not happen: where the drive is, where it should be, why.
     Transition(NodeId, State, State, Hindrance),
@@ -201,8 +201,8 @@ impl Cause {
         })
     }
 
-    /// Whether the nodes' configuration can no longer be trusted, so that an acknowledged driver must start
-    /// anew.
+    /// Whether the nodes' configuration can no longer be trusted, so that the driver must start again after
+    /// it was acknowledged.
     pub fn needs_restart(&self) -> bool {
         matches!(
             self,
@@ -364,7 +364,7 @@ impl fmt::Display for Cause {
 
 impl core::error::Error for Cause {}
 
-/// What a drive tells of its last error, read after a stop.
+/// The details of a drive's last error, read after a stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Details {
     /// Error register 0x1001.
@@ -404,11 +404,11 @@ impl fmt::Display for Details {
 /// Why a call was refused. Nothing has changed then.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refusal {
-    /// Not now: what the driver is doing.
+    /// Not possible in the present phase: what the driver is doing.
     Phase(&'static str),
     /// A cause is latched; acknowledge it first.
     Latched(Cause),
-    /// The profile knows nothing of the mode.
+    /// The profile does not have the mode.
     NoMode(ControlMode),
     /// The mode was not verified on hardware, and the caller does not accept that.
     NotVerified(ControlMode),

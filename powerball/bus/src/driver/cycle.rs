@@ -31,12 +31,12 @@ impl<const N: usize> Driver<N> {
         checked
     }
 
-    /// As [`Self::set`], in interpolated position mode, with a torque (N·m) that each drive adds to its own
-    /// from the next SYNC on: feed-forward. It holds until the next one is given, and is 0 whenever the arm
-    /// does not run.
+    /// Sets set-points like [`Self::set`], in interpolated position mode, with a feed-forward torque (N·m)
+    /// that each drive adds to its own from the next SYNC on. It holds until the next one is given, and is 0
+    /// whenever the arm does not run.
     ///
     /// # Errors
-    /// As [`Driver::set`]; and where a torque is no number, more than the joint has, or further from the last one than
+    /// As [`Driver::set`]; and if a torque is NaN, more than the joint has, or further from the last one than
     /// [`Reactions::current_step`](super::profile::Reactions::current_step) of that.
     pub fn set_with_torque(&mut self, setpoints: &[f64; N], torques: &[f64; N]) -> Result<(), Rejection> {
         if self.phase != Phase::Running {
@@ -254,8 +254,8 @@ impl<const N: usize> Driver<N> {
         }
     }
 
-    /// A cycle without new set-points, or with rejected ones: the joints go on as they went, within their limits. To
-    /// stand still at once would be an acceleration that no joint has.
+    /// Handles a cycle without new set-points, or with rejected ones: the joints continue their motion within
+    /// their limits. An immediate standstill would need an acceleration that no joint has.
     ///
     /// # Errors
     /// Where that takes more torque than a joint has.

@@ -107,7 +107,7 @@ pub struct Entry {
     pub name: &'static str,
 }
 
-/// What may be done with a variable.
+/// Access rights of a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Access {
     /// Only read.
@@ -133,17 +133,17 @@ impl Entry {
         }
     }
 
-    /// This entry, which can be in a PDO.
+    /// Marks this entry as one that can be mapped to a PDO.
     pub const fn mapped(self) -> Entry {
         Entry { mappable: true, ..self }
     }
 
-    /// This entry with its value after power-up.
+    /// Sets the value of this entry after power-up.
     pub const fn default(self, value: i64) -> Entry {
         Entry { default: Some(value), ..self }
     }
 
-    /// This entry with its value after power-up, to which the node's number is added.
+    /// Sets the value of this entry after power-up, to which the node's number is added.
     pub const fn default_plus_node(self, value: i64) -> Entry {
         Entry { default: Some(value), plus_node: true, ..self }
     }

@@ -1,4 +1,4 @@
-//! What a set-point must be to leave for the arm, and a whole path before the arm moves.
+//! Conditions that a set-point must meet before it is sent, and a whole path before the arm moves.
 
 use super::cause::Rejection;
 use super::profile::{JointProfile, Profile, Reactions};

@@ -1,6 +1,6 @@
 //! One joint while the driver runs: what its drive reports, and what it is commanded.
 //!
-//! Also here: what the driver requires of a transport, and what a transport reports to it.
+//! The traits and events between driver and transport: [`Transmit`] and [`BusEvent`].
 
 use super::profile::{JointProfile, ModeProfile};
 use super::script::Progress;
@@ -30,7 +30,7 @@ pub struct JointCounters {
     pub implausible: u64,
 }
 
-/// What is known of one joint.
+/// The measured and commanded state of one joint.
 #[derive(Clone, Copy, Debug)]
 pub struct Joint {
     /// Position, rad.
@@ -65,7 +65,7 @@ pub struct Joint {
     pub(super) client: Client,
     pub(super) step: usize,
     pub(super) retries: u8,
-    /// Not before then.
+    /// Earliest time of the next step.
     pub(super) next_step: Micros,
     pub(super) booted: Option<Micros>,
     pub(super) heartbeat: HeartbeatConsumer,
@@ -153,7 +153,7 @@ impl Joint {
         self.status.map(Statusword::state)
     }
 
-    /// Process data of transmit PDO `number`; false where it is not as mapped.
+    /// Stores the process data of transmit PDO `number`; returns false if it does not fit the mapping.
     pub(super) fn update(&mut self, number: u8, mapping: &Mapping, frame: &Frame) -> bool {
         let Some(values) = mapping.unpack(frame.bytes()) else {
             self.counters.malformed += 1;
@@ -191,7 +191,7 @@ impl Joint {
         }
     }
 
-    /// What holds the joint where it is: its actual position, or zero.
+    /// The set-point that holds the joint: its actual position, or zero.
     pub(super) fn hold(&self, control: ControlMode) -> f64 {
         if control.is_position() { self.position } else { 0.0 }
     }
@@ -279,7 +279,7 @@ pub trait Transmit {
     fn discard_queued(&mut self);
 }
 
-/// What a transport tells of its controller.
+/// An event that a transport reports about its controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BusEvent {
     /// The controller is error passive: a warning.

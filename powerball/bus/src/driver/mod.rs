@@ -1,15 +1,15 @@
-//! The arm as one thing on its CAN bus: a CANopen master for CiA 402 drives, without clock, I/O or
+//! The master of the arm on its CAN bus: a CANopen master for CiA 402 drives, without clock, I/O or
 //! allocation.
 //!
-//! A [`Driver`] is given the time and frames; it gives back frames ([`Transmit`]). What it must know of
-//! the arm stands in a [`Profile`]. Set-points and measurements are in SI.
+//! A [`Driver`] is given the time and frames; it gives back frames ([`Transmit`]). The data of the arm are in
+//! a [`Profile`]. Set-points and measurements are in SI.
 //!
 //! ```text
 //! Idle ─start→ Listening → Boot → Identify → Configure → Verify → Starting → Ready
 //! Ready ─enable→ Enabling → Running (set each cycle)
 //! Enabling, Running ─stop→ Stopping → Ready
 //! any phase ─cause→ Stopping (where joints may move) → Faulted
-//! Faulted ─acknowledge→ Resetting → Starting, or Idle, where the cause asks for a restart
+//! Faulted ─acknowledge→ Resetting → Starting, or Idle, where the cause needs a restart
 //! ```
 //!
 //! # A cycle
@@ -88,7 +88,7 @@ use stop::{ResetStage, StopStage};
 pub use torque::{ControlMode, TorqueGuard};
 pub use torque_mode::Tracking;
 
-/// What the driver is doing.
+/// The phases of the driver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Phase {
     /// Nothing: no frame leaves.
@@ -99,7 +99,7 @@ pub enum Phase {
     Boot,
     /// Who they are and what they offer is read.
     Identify,
-    /// They are configured.
+    /// The nodes are configured.
     Configure,
     /// The configuration is read back.
     Verify,
@@ -191,7 +191,7 @@ pub struct Counters {
     pub error_passive: u64,
     /// Times that received frames were lost in the controller or the adapter.
     pub overruns: u64,
-    /// Received frames that are nobody's.
+    /// Received frames of unknown identifiers.
     pub unexpected: u64,
 }
 
@@ -361,9 +361,9 @@ impl<const N: usize> Driver<N> {
         }
     }
 
-    /// Says that the latched cause was seen. Drives in fault are then reset, once; where the nodes'
-    /// configuration can no longer be trusted the driver is idle, to be started anew. Nothing moves: that
-    /// needs [`Driver::enable`].
+    /// Acknowledges the latched cause. Drives in fault are then reset, once. If the nodes' configuration can
+    /// no longer be trusted, the driver becomes idle and must be started again. Nothing moves before
+    /// [`Driver::enable`].
     ///
     /// # Errors
     /// Where nothing is latched, or the arm is still being stopped.
@@ -397,12 +397,12 @@ impl<const N: usize> Driver<N> {
         self.control
     }
 
-    /// What the bus carries in this mode.
+    /// The load of the bus in this mode.
     pub fn budget(&self) -> &Budget {
         &self.budget
     }
 
-    /// What the driver is doing.
+    /// The present phase of the driver.
     pub fn phase(&self) -> Phase {
         self.phase
     }
@@ -412,12 +412,12 @@ impl<const N: usize> Driver<N> {
         self.cause.as_ref()
     }
 
-    /// Whether [`Driver::acknowledge`] leads to [`Phase::Idle`], to be started anew.
+    /// Whether [`Driver::acknowledge`] leads to [`Phase::Idle`], from which the driver must be started again.
     pub fn needs_restart(&self) -> bool {
         self.restart
     }
 
-    /// What the drive that the cause names reported about its error, as far as it was read.
+    /// The error details of the drive that the cause names, as far as they were read.
     pub fn details(&self) -> &Details {
         &self.details
     }
@@ -447,7 +447,7 @@ impl<const N: usize> Driver<N> {
         self.synced_at
     }
 
-    /// What was reported, oldest first; the last 16.
+    /// The last 16 notes, oldest first.
     pub fn notes(&self) -> impl Iterator<Item = &Note> {
         let (newer, older) = self.notes.split_at(self.noted % NOTES);
         older.iter().chain(newer).flatten()

@@ -1,4 +1,4 @@
-//! What the driver must know of an arm before it speaks to it: constant tables, made offline from the drive's
+//! The data of an arm that the driver needs: constant tables, made offline from the drive's
 //! DCF and one TOML ([`super::import`] with `std`; [`super::lwa4p`] is the result for the SCHUNK Powerball
 //! LWA 4P).
 
@@ -14,9 +14,9 @@ use crate::cia402::{Controlword, Mode, objects};
 pub struct ModeProfile {
     /// Number in 0x6060.
     pub mode: Mode,
-    /// Where the set-point goes; it and the controlword must be in `rpdo`.
+    /// The object of the set-point; it and the controlword must be in `rpdo`.
     pub setpoint: Object,
-    /// What the one receive PDO carries in this mode.
+    /// The mapping of the receive PDO in this mode.
     pub rpdo: Mapping,
     /// Bits of the controlword, in addition to "enable operation", while the joint follows set-points.
     pub running_bits: u16,
@@ -25,7 +25,7 @@ pub struct ModeProfile {
 }
 
 impl ModeProfile {
-    /// What stands for the mode until one was chosen: nothing is received and nothing is sent.
+    /// The placeholder until a mode was chosen: nothing is received and nothing is sent.
     pub(super) const NONE: ModeProfile = ModeProfile {
         mode: Mode::None,
         setpoint: Object::new(0, 0),
@@ -35,7 +35,8 @@ impl ModeProfile {
     };
 }
 
-/// What 0x1018 must say, where it is known. What is `None` is read and reported, not compared.
+/// The expected identity (0x1018), as far as it is known. Entries that are `None` are read and reported, but
+/// not compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Identity {
     /// Sub 1.
@@ -53,7 +54,7 @@ pub struct Identity {
 pub struct JointProfile {
     /// The joint's drive.
     pub node: NodeId,
-    /// What 0x1018 must say.
+    /// The expected identity (0x1018).
     pub identity: Identity,
     /// Counts, currents and torques.
     pub units: JointUnits,
@@ -82,9 +83,10 @@ pub struct Reactions {
     pub missing_cycles: u8,
     /// A SYNC later than this part of the period counts as late.
     pub late_fraction: f64,
-    /// This many late SYNCs, without [`Reactions::forgiving_cycles`] good ones between them, stop the arm.
+    /// Number of late SYNCs that stop the arm, without [`Reactions::forgiving_cycles`] good ones between
+    /// them.
     pub late_limit: u8,
-    /// This many SYNCs in a row that could not be sent at all stop the arm.
+    /// Number of SYNCs in a row that could not be sent at all and stop the arm.
     pub skipped_limit: u64,
     /// Good cycles after which late ones and rejected set-points are forgotten.
     pub forgiving_cycles: u16,
@@ -102,8 +104,7 @@ pub struct Reactions {
     /// A joint measured faster than this times its greatest velocity, for [`Reactions::missing_cycles`] cycles,
     /// stops the arm.
     pub overspeed_factor: f64,
-    /// This much travel, rad, is asked for in velocity mode before it is compared with the travel that was
-    /// gone.
+    /// Commanded travel in velocity mode, rad, before it is compared with the measured travel.
     pub scale_travel: f64,
     /// Cycles in a row beyond [`JointProfile::following_error`] that stop the arm; their time is written to 0x6066
     /// where the drive has it.
@@ -189,7 +190,7 @@ pub struct TorqueMode {
 }
 
 impl TorqueMode {
-    /// What docs/control.md argues for.
+    /// The limits that docs/control.md derives.
     pub const DEFAULT: TorqueMode = TorqueMode {
         cycles: 3,
         missing_cycles: 6,
@@ -278,10 +279,10 @@ pub struct Profile<const N: usize> {
     pub interpolated_position: Option<ModeProfile>,
     /// Current.
     pub current: Option<ModeProfile>,
-    /// What 0x604C must read for velocities to be scaled as [`VelocityScale`] says.
+    /// The value that 0x604C must have: velocities are scaled by it as [`VelocityScale`] says.
     pub velocity_scale: VelocityScale,
-    /// What the drives send each SYNC; empty ones are switched off. Statusword, position and mode display
-    /// must be in them.
+    /// The transmit PDOs that the drives send at each SYNC; empty ones are switched off. Statusword, position
+    /// and mode display must be in them.
     pub tpdos: [Mapping; 4],
     /// The joints from the base on.
     pub joints: [JointProfile; N],
@@ -290,7 +291,7 @@ pub struct Profile<const N: usize> {
 }
 
 impl<const N: usize> Profile<N> {
-    /// What is known of `mode`.
+    /// The profile of `mode`, if the arm has it.
     pub const fn mode(&self, mode: ControlMode) -> Option<&ModeProfile> {
         match mode {
             ControlMode::ProfilePosition => self.profile_position.as_ref(),

@@ -1,6 +1,6 @@
 //! Frames from the arm: stored, and judged by what the phase expects.
 //!
-//! Also here: frames that only a master sends, and that this one did not.
+//! [`Foreign`] frames are those that only a master sends, and that this one did not.
 
 use super::script::Progress;
 use super::{Cause, ControlMode, Driver, Phase, Transmit};
@@ -237,7 +237,7 @@ impl<const N: usize> Driver<N> {
 
 // Frames that only a master sends, and that this one did not: another master is on the bus.
 
-/// What another master was heard to send.
+/// A frame that was received from another master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Foreign {
     /// SYNC.
@@ -262,8 +262,8 @@ impl fmt::Display for Foreign {
 }
 
 impl<const N: usize> Driver<N> {
-    /// Whether `frame` is one that only a master sends; it is judged then. A transport gives back nothing of what
-    /// this end has sent, so it is another's.
+    /// Whether `frame` is one that only a master sends; it is judged then. A transport does not return frames
+    /// that this end has sent, so the frame is from another master.
     pub(super) fn is_foreign(&mut self, frame: &Frame, tx: &mut impl Transmit) -> bool {
         let master = self.profile.master;
         let foreign = match Cob::of(frame) {
@@ -282,7 +282,7 @@ impl<const N: usize> Driver<N> {
         true
     }
 
-    /// Before anything is sent: nobody else may be heard to master the arm.
+    /// Listens before anything is sent: no other master may be on the bus.
     pub(super) fn poll_listening(&mut self) {
         if self.elapsed() >= self.profile.reactions.listen_time {
             self.enter(Phase::Boot);

@@ -1,6 +1,6 @@
-//! What is read from and written to each drive before it may move, as lists without memory of their own.
+//! The objects that are read from and written to each drive before it may move, as lists without allocation.
 //!
-//! Also here: how far a joint is on its way to its operation.
+//! A joint's progress through these lists is here, too.
 
 use super::profile::{ModeProfile, Profile};
 use super::torque::ControlMode;
@@ -85,7 +85,7 @@ impl Pdo {
         Pdo { number, cob: Cob::Tpdo(number, node).id(), parameter: tpdo_parameter, mapping: tpdo_mapping }
     }
 
-    /// Switched off, mapped anew and switched on, in the order that CiA 301 asks for; only switched off where
+    /// Switched off, mapped anew and switched on, in the order that CiA 301 requires; only switched off where
     /// empty.
     fn configure(self, mapping: Mapping) -> impl Iterator<Item = Write> {
         let Pdo { number, cob, parameter, mapping: mapped } = self;
@@ -168,7 +168,8 @@ pub(super) fn configuration<const N: usize>(
     })
 }
 
-/// What is read from each drive before anything is written, in order: device type, identity, what it offers, its scales.
+/// The objects that are read from each drive before anything is written, in order: device type, identity,
+/// supported modes, scales.
 pub(super) fn questions(mode: &ModeProfile, control: ControlMode) -> impl Iterator<Item = Object> {
     let identity = [DEVICE_TYPE, VENDOR_ID, PRODUCT_CODE, REVISION, SERIAL_NUMBER];
     let always = identity.into_iter().chain([objects::SUPPORTED_MODES, objects::RATED_CURRENT]);

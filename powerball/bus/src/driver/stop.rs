@@ -75,7 +75,7 @@ impl<const N: usize> Driver<N> {
         }
     }
 
-    /// What the transport tells.
+    /// Handles an event of the transport.
     pub fn event(&mut self, event: BusEvent, now: Micros, tx: &mut impl Transmit) {
         self.now = now;
         match event {
@@ -110,8 +110,8 @@ impl<const N: usize> Driver<N> {
         if self.cause.is_none_or(tells_more) {
             self.cause = Some(cause);
         }
-        // Where first data does not come in any way that a fault reset could mend, the nodes must be
-        // configured anew.
+        // If first data is missing for a reason that a fault reset cannot correct, the nodes must be
+        // configured again.
         let mendable = matches!(cause, Cause::DriveFault(..) | Cause::Emergency(..));
         self.restart |= cause.needs_restart() || self.phase == Phase::Starting && !mendable;
     }

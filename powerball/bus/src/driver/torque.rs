@@ -1,7 +1,7 @@
-//! The torque that set-points require of the joints, from a model of the arm: what no limit of one joint can
-//! see.
+//! The torque that set-points require of the joints, from a model of the arm: a check that limits of single
+//! joints cannot make.
 //!
-//! Also here: what one joint was commanded last; how the joints are commanded.
+//! The last commands of each joint, and the kind of command, are here, too.
 
 use super::cause::Rejection;
 use super::joint::Joint;
@@ -24,18 +24,18 @@ pub struct TorqueGuard<const N: usize> {
 }
 
 impl<const N: usize> TorqueGuard<N> {
-    /// Of an arm's inverse dynamics (rad, rad/s, rad/s² → N·m).
+    /// A guard with an arm's inverse dynamics (rad, rad/s, rad/s² → N·m).
     pub const fn new(inverse_dynamics: &'static InverseDynamics<N>) -> Self {
         TorqueGuard { model: inverse_dynamics, margin: 0.0 }
     }
 
-    /// This guard where somebody pushes the arm in current mode, with up to this part of each joint's torque.
+    /// Allows a person to push the arm in current mode, with up to this part of each joint's torque.
     #[must_use]
     pub const fn with_push(self, part: f64) -> Self {
         TorqueGuard { margin: part, ..self }
     }
 
-    /// That part.
+    /// The part of each joint's torque that a push may have.
     pub(super) const fn margin(&self) -> f64 {
         self.margin
     }
@@ -47,9 +47,9 @@ impl<const N: usize> TorqueGuard<N> {
 
     /// Whether the joints have the torque that `setpoints` require of them after those that have left.
     ///
-    /// Interpolated positions are looked at with the velocity and the acceleration of their differences, velocities
-    /// with theirs where the joints are, targets of profile position at rest there: the drive plans the way. A current
-    /// is a torque itself, and bounded as one.
+    /// Interpolated positions are checked with the velocity and the acceleration of their differences,
+    /// velocities with theirs where the joints are, targets of profile position at rest there: the drive
+    /// plans the way. A current is a torque itself, and bounded as one.
     pub(super) fn check(
         &self,
         profile: &Profile<N>,
@@ -127,9 +127,9 @@ impl Demand {
         (self.points[0] - self.points[1]) / period
     }
 
-    /// Where positions go on to, for a cycle in which nothing new came: with the velocity and the acceleration that
-    /// they had, within the limits of both. Not back: what slows down comes to rest, and what rests stays. What
-    /// could not come to rest any more before the end of its range (`position`, rad) brakes.
+    /// The extrapolated position for a cycle without a new one: with the last velocity and acceleration,
+    /// within the limits of both. Not back: what slows down comes to rest, and what rests stays. What could
+    /// not come to rest any more before the end of its range (`position`, rad) brakes.
     pub(super) fn next(&self, period: f64, position: [f64; 2], velocity: f64, acceleration: f64) -> f64 {
         let v = self.velocity(period);
         let before = (self.points[1] - self.points[2]) / period;

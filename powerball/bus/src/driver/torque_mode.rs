@@ -1,11 +1,12 @@
 //! The guard of current mode: a joint that does not move as its torque says, or measurements that no joint can have.
 //!
-//! In the other modes a drive holds its joint, and a wrong measurement is an error that can be seen. In current mode the
-//! caller's law holds it: what is measured wrong becomes a motion. So each joint is looked at in every cycle:
+//! In the other modes a drive holds its joint, and a wrong measurement is an error that can be seen. In
+//! current mode the caller's law holds it: what is measured wrong becomes a motion. So each joint is checked
+//! in every cycle:
 //!
 //! * a velocity that no joint can have is not used, and stops the arm when it stays;
-//! * position and integrated velocity that drift apart: one of the two is no measurement;
-//! * the measured current against the one that was asked for;
+//! * position and integrated velocity that drift apart: one of the two is wrong;
+//! * the measured current against the commanded one;
 //! * the torque that acted against what the model needs for the measured motion ([`TorqueGuard`]), where there is a model:
 //!   a drive that does not act or acts the wrong way, a joint that is stuck, an encoder that stands still;
 //! * where the caller says where the joint should be ([`Tracking`]), how far it is from there;
@@ -36,7 +37,7 @@ const WINDOW: usize = 4;
 /// Below this part of the greatest velocity a joint may stick: all of its dry friction can hold it.
 const SLOW: f64 = 0.05;
 
-/// What the guard remembers of one joint.
+/// The guard's memory of one joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Guarded {
     /// Positions and velocities of the last cycles with all data, newest first, and their SYNC.
@@ -49,7 +50,8 @@ pub(super) struct Guarded {
     acted: [f64; WINDOW + 2],
     /// The joint's own inertia by the model, kg·m²; nothing before it was asked for.
     inertia: Option<f64>,
-    /// Distance from where the joint should be, and the tolerance, where the caller said so in this cycle, rad.
+    /// Distance from where the joint should be, and the tolerance, rad, if the caller gave them in this
+    /// cycle.
     off: Option<[f64; 2]>,
     /// Cycles in a row.
     implausible: u8,
@@ -140,7 +142,7 @@ impl<const N: usize> Driver<N> {
         ([position, self.joints.each_ref().map(|joint| joint.velocity)], missed)
     }
 
-    /// Forgets what it has seen: the joints are released.
+    /// Clears the memory of the guard: the joints are released.
     pub(super) fn release_guard(&mut self) {
         self.joints.iter_mut().for_each(|joint| joint.guarded = Guarded::default());
     }
@@ -170,7 +172,7 @@ impl<const N: usize> Driver<N> {
         }
     }
 
-    /// All data of a joint has come: position and velocity are held against each other.
+    /// Compares position and velocity of a joint when all its data has arrived.
     pub(super) fn guard_sample(&mut self, j: usize, tx: &mut impl Transmit) {
         if !self.is_guarded() {
             return;
@@ -248,8 +250,8 @@ impl<const N: usize> Driver<N> {
         }))
     }
 
-    /// Once a cycle, in current mode: the joint whose torque acts least as the model says, of those of which too much is
-    /// left for too long.
+    /// Called once a cycle in current mode: finds the joint with the largest torque error, among those whose
+    /// error was too large for too long.
     pub(super) fn torque_error(&mut self, left: &[Left; N]) -> Option<Cause> {
         let limit = self.profile.reactions.torque_mode.cycles;
         let mut worst: Option<(f64, usize)> = None;

@@ -1,5 +1,5 @@
-//! The watch on what the joints do: following error, velocity error, standstill, jumps, limits, torque, and the
-//! bits of the statusword other than its state. The master watches always, whatever the drives watch
+//! The watch on the motion of the joints: following error, velocity error, standstill, jumps, limits, torque,
+//! and the bits of the statusword other than its state. The master watches always, whatever the drives watch
 //! themselves.
 
 use super::cause::Hindrance;
@@ -11,7 +11,7 @@ use crate::cia402::{State, Statusword};
 /// A joint that is off by less than this share of what may be keeps up with its set-points.
 const BEHIND: f64 = 0.2;
 
-/// What the watch remembers of one joint.
+/// The watch's memory of one joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Watched {
     /// Last position and when it came.

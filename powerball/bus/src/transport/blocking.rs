@@ -1,4 +1,5 @@
-//! SDO transfers that wait for their end, for commands and tools. What else comes meanwhile is passed by.
+//! SDO transfers that wait for their end, for commands and tools. Other frames that arrive meanwhile are
+//! ignored.
 
 use super::{Bus, BusError, Event};
 use crate::canopen::client::{Client, SdoError, Value};
@@ -49,7 +50,7 @@ pub fn write(bus: &mut dyn Bus, node: NodeId, object: Object, value: Value) -> R
     write_within(bus, node, object, value, TIMEOUT)
 }
 
-/// As [`write()`], with `timeout` µs for each answer.
+/// Writes like [`write()`], with `timeout` µs for each answer.
 pub(super) fn write_within(
     bus: &mut dyn Bus,
     node: NodeId,

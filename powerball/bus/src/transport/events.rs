@@ -1,4 +1,4 @@
-//! A driver's events, for the program's event log (crate `tracing`): what changes, not what every cycle has.
+//! A driver's events, for the program's event log (crate `tracing`): changes, not every cycle.
 //!
 //! `error` where the arm is stopped by a cause, `warn` for what the driver notes and tolerates, `info` for
 //! its phases, `debug` for the state of each drive. Without a listener, and in a cycle without a change, this
@@ -11,7 +11,7 @@ use powerball_controller::JointNumber;
 /// What RUST_LOG calls them: the part of `powerball` that users know.
 const EVENTS: &str = "powerball::bus";
 
-/// What the events so far have said.
+/// The state that the events have reported so far.
 #[derive(Debug)]
 pub(super) struct Observed<const N: usize> {
     phase: Phase,
@@ -20,7 +20,7 @@ pub(super) struct Observed<const N: usize> {
 }
 
 impl<const N: usize> Observed<N> {
-    /// Of a driver whose events are all in the future.
+    /// An observer that has not reported anything of `driver` yet.
     pub(super) fn of(driver: &Driver<N>) -> Self {
         Observed { phase: driver.phase(), states: states(driver), note: driver.notes().last().copied() }
     }
@@ -61,7 +61,7 @@ impl<const N: usize> Observed<N> {
             for note in driver.notes().skip(new) {
                 let bus_time = note.at as f64 * 1e-6;
                 match &note.cause {
-                    // Such a thing stops the start, or the caller accepted it.
+                    // Such a cause stops the start, or the caller accepted it.
                     what @ (Cause::WrongIdentity(..) | Cause::Sdo(..)) if driver.cause() != Some(what) => {
                         tracing::warn!(target: EVENTS, bus_time, "{what}: accepted");
                     }

@@ -1,4 +1,4 @@
-//! Signals that end a program, as a wish that the arm's master fulfils first.
+//! Signals that end a program: the arm's master stops the arm first.
 
 use std::io;
 use std::sync::Arc;
@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Whether this process was asked to end: Ctrl-C, SIGTERM, SIGHUP, SIGQUIT.
 ///
-/// While a [`Master`](super::Master) with it lives, such a signal stops the arm: quick stop, brakes, no torque. A
-/// second signal asks for the same again and does not skip it, nor what the process then does to end: its log is
-/// closed. Once the master is gone and no signal came, signals end the process as usual. A file-size limit (SIGXFSZ) is
-/// an error of the write, and no end of the process.
+/// While a [`Master`](super::Master) with it lives, such a signal stops the arm: quick stop, brakes, no
+/// torque. A second signal does not skip the stop, nor the end of the process, which closes its log. Once the
+/// master is gone and no signal came, signals end the process as usual. A file-size limit (SIGXFSZ) is an
+/// error of the write and does not end the process.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt {
     asked: Arc<AtomicBool>,
@@ -55,8 +55,8 @@ impl Interrupt {
     }
 }
 
-/// Makes a file-size limit (`ulimit -f`) an error of the write that meets it, and no end of this process, which could then
-/// neither say so nor take away what it has half written.
+/// Turns a file-size limit (`ulimit -f`) into an error of the write that reaches it. Otherwise it would end
+/// this process, which could neither report it nor remove a half-written file.
 ///
 /// # Errors
 /// Where the system does not let signals be listened to.

@@ -1,4 +1,4 @@
-//! A driver on a bus: the loop that neither of them has.
+//! A driver on a bus, with the loop that connects them.
 
 #[cfg(unix)]
 use super::Watchdog;
@@ -32,7 +32,7 @@ pub struct Master<B: Bus, const N: usize> {
     watchdog: Option<Watchdog>,
 }
 
-/// What has happened in a [`step`](Master::step).
+/// The result of a [`step`](Master::step).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moment {
     /// A SYNC has left: new set-points may be given.
@@ -125,8 +125,7 @@ impl<B: Bus, const N: usize> Master<B, N> {
         }
     }
 
-    /// This master with a second process that stops the arm where this one dies. It is dismissed once the arm
-    /// rests.
+    /// Adds a second process that stops the arm if this one dies. It ends once the arm rests.
     #[cfg(unix)]
     #[must_use]
     pub fn with_watchdog(mut self, watchdog: Watchdog) -> Self {
@@ -134,7 +133,7 @@ impl<B: Bus, const N: usize> Master<B, N> {
         self
     }
 
-    /// This master, stopped by signals: the stop leaves within 10 ms of one.
+    /// Lets signals stop this master: the stop is sent within 10 ms of a signal.
     #[must_use]
     pub fn with_interrupt(mut self, interrupt: Interrupt) -> Self {
         interrupt.guard(true);
@@ -277,10 +276,10 @@ impl<B: Bus, const N: usize> Master<B, N> {
         matches!(self.driver.phase(), Phase::Ready | Phase::Idle | Phase::Faulted)
     }
 
-    /// The drives need not watch this master any more: it leaves in order, and none of them takes its silence for
-    /// an emergency. A node that does not answer is left as it is.
+    /// Ends the drives' watch on this master before it leaves, so that none of them treats its silence as an
+    /// emergency. A node that does not answer is not changed.
     fn disarm_watch(&mut self) {
-        // Off the bus nobody hears it, and where another master was heard the nodes are that one's.
+        // Off the bus no node receives it; and if there is another master, the nodes belong to it.
         let silent = matches!(self.driver.cause(), Some(Cause::BusOff | Cause::OtherMaster(_)));
         if self.driver.phase() == Phase::Idle || silent {
             return;

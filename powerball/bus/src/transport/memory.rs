@@ -1,7 +1,7 @@
 //! A bus in memory, on a clock of its own.
 //!
 //! Frames take the time that they take on a wire with the most stuffing, the lowest identifier goes first,
-//! and time passes only while somebody waits for it. The same calls give the same events at the same times,
+//! and time passes only while a caller waits. The same calls give the same events at the same times,
 //! always.
 
 use super::{Bus, BusError, Event};
@@ -10,10 +10,11 @@ use crate::driver::budget::worst_bits;
 use std::collections::VecDeque;
 use std::fmt;
 
-/// Frames that one side may have waiting, as SocketCAN's default queue with room for a cycle of six drives.
+/// Number of frames that may wait on one side: like SocketCAN's default queue, enough for a cycle of six
+/// drives.
 const QUEUE: usize = 32;
 
-/// What is on the other end of the bus: one or many nodes.
+/// The other end of the bus: one or many nodes.
 pub trait Peer: fmt::Debug {
     /// A frame from the wire at time `now`.
     fn receive(&mut self, frame: &Frame, now: Micros);

@@ -37,7 +37,7 @@ use crate::canopen::{Frame, Micros};
 use std::fmt;
 use std::time::{Duration, Instant};
 
-/// What comes from a bus.
+/// An event of a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// A frame of another node.
@@ -48,13 +48,13 @@ pub enum Event {
     BusOff,
     /// The controller is on the bus again.
     Restarted,
-    /// The controller or the adapter had no room for frames that it received: some are lost.
+    /// The receive buffer of the controller or the adapter was full: frames are lost.
     Overrun,
     /// A frame that was taken could not be sent.
     NotSent,
 }
 
-/// Why a bus does not do what it was asked for.
+/// The reason why a bus failed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BusError {
     /// Too many frames wait to be sent: this one was not taken.
@@ -63,13 +63,13 @@ pub enum BusError {
     /// The controller is off the bus.
     #[error("the controller is off the bus")]
     Off,
-    /// What the system says, with what was tried.
+    /// An error of the system: what was tried, and the system's message.
     #[error("{0}")]
     Io(String),
 }
 
 impl BusError {
-    /// What was tried, and what the system said.
+    /// An error with what was tried and the system's message.
     fn io(what: impl fmt::Display, error: impl fmt::Display) -> BusError {
         BusError::Io(format!("{what}: {error}"))
     }

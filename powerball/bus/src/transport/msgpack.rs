@@ -1,5 +1,5 @@
-//! The datagrams of python-can's `udp_multicast`: one MessagePack map for each frame. What is recorded of such a bus
-//! (a capture of its network) is read by these as well.
+//! The datagrams of python-can's `udp_multicast`: one MessagePack map for each frame. The same functions read
+//! a recording of such a bus (a capture of its network).
 
 use crate::canopen::Frame;
 use serde::{Deserialize, Serialize};

@@ -9,11 +9,12 @@ use thread_priority::{
 /// the interrupts of the CAN controller where they have been given more.
 const PRIORITY: u8 = 50;
 
-/// Runs the calling thread under `SCHED_FIFO` and locks the process's memory, so that neither another program nor a
-/// page from a disk keeps a SYNC waiting. Threads that this one makes afterwards have the same; [`resign`] lets go.
+/// Runs the calling thread under `SCHED_FIFO` and locks the process's memory, so that neither another program
+/// nor a page from a disk keeps a SYNC waiting. Threads that this one starts afterwards inherit it;
+/// [`resign`] gives it up.
 ///
 /// # Errors
-/// In words, what the system refused and what would allow it. What it did allow stays.
+/// What the system refused, and how to allow it. Rights that it did grant remain.
 pub fn claim() -> Result<(), String> {
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
     let mut refused = Vec::new();

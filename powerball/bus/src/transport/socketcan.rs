@@ -127,7 +127,7 @@ impl Bus for SocketCan {
         }
     }
 
-    /// The kernel's queue cannot be reached from here: what it holds still goes out, unless the interface is
+    /// The kernel's queue cannot be cleared from here: its frames are still sent, unless the interface is
     /// off.
     fn flush(&mut self) {}
 }

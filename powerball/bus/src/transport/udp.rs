@@ -1,7 +1,7 @@
 //! python-can's `udp_multicast`: each frame is a datagram to a multicast group that stays on this machine.
 //!
-//! Nobody who speaks here is asked who he is. So only datagrams to the group are taken, and, unless an interface is named,
-//! only those whose sender is this machine itself.
+//! Senders are not authenticated. So only datagrams to the group are taken, and, unless an interface is
+//! named, only those whose sender is this machine itself.
 
 use super::{Bus, BusError, Clock, Event, Interface, msgpack, readable};
 use crate::canopen::{Frame, Micros};
@@ -189,7 +189,7 @@ mod tests {
             return;
         };
         let own = [IpAddr::from([127, 0, 0, 1]), IpAddr::from([127, 1, 2, 3])];
-        // TEST-NET-3: nobody's address.
+        // TEST-NET-3: an address that is never assigned.
         let other = IpAddr::from([203, 0, 113, 7]);
         assert!(own.iter().all(|from| bus.takes(*from)) && !bus.takes(other) && !bus.takes(other));
         bus.open = true;

@@ -1,4 +1,4 @@
-//! The last word on a bus, where the process that moves the arm dies without one.
+//! A second process that stops the arm if the process that moves it dies.
 
 use signal_hook::consts::{SIGABRT, SIGHUP, SIGINT, SIGQUIT, SIGTERM};
 use signal_hook::low_level::{pipe, unregister};
@@ -46,10 +46,11 @@ impl Watchdog {
         Ok(Watchdog { child, on_abort })
     }
 
-    /// For the second process: returns when the first one has died. Signals that end both leave this one alive until then.
+    /// Waits in the second process, and returns when the first one has died. Signals that end both leave this
+    /// one alive until then.
     ///
     /// # Errors
-    /// Where the system does not let signals be listened to, or nobody waits for this process.
+    /// Where the system does not let signals be listened to, or no process waits for this one.
     pub fn wait() -> io::Result<()> {
         for signal in [SIGINT, SIGTERM, SIGHUP, SIGQUIT] {
             flag::register(signal, Arc::default())?;

@@ -33,9 +33,9 @@ pub struct Bet<T, const P: usize> {
     usual: SMatrix<T, P, P>,
     usual_score: SVector<T, P>,
     samples: T,
-    /// Of all its beginnings together.
+    /// Capital of the bets that started at all samples, together.
     capital: T,
-    /// Of the best one, and which that is.
+    /// Capital of the best of these bets; `since` is the sample at which it started.
     largest: T,
     since: u64,
 }
@@ -56,7 +56,7 @@ impl<T: RealField + Copy, const P: usize> Default for Bet<T, P> {
 }
 
 impl<T: RealField + Copy, const P: usize> Bet<T, P> {
-    /// Takes sample `number`: what each joint says that moves.
+    /// Takes sample `number`: one term for each joint that moves.
     pub fn update(&mut self, terms: &[Term<T, P>], number: u64) {
         if terms.is_empty() {
             return;

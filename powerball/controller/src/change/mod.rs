@@ -1,9 +1,10 @@
 //! Says when a torque model no longer holds: a sequential test of its innovations with a stated rate of false alarms.
 //!
-//! **Innovations** ([`Joint`]). A joint's residual r (measured less predicted torque) has a colour: r(t) − Σ a_k·r(t−k) is
-//! what nobody could tell from its past, and over its deviation σ it is z. Friction wanders by ± range of itself without
-//! a change; it does so slowly, so it is followed: z(t) − ρ(t)·f(t), with f the friction through the same filter and ρ its
-//! share by least squares over the last [`FOLLOWED`] samples, within ± range, is the innovation.
+//! **Innovations** ([`Joint`]). A joint's residual r (measured less predicted torque) has a colour: r(t) − Σ
+//! a_k·r(t−k) is what its past could not predict, and over its deviation σ it is z. Friction wanders by ±
+//! range of itself without a change; it does so slowly, so it is followed: z(t) − ρ(t)·f(t), with f the
+//! friction through the same filter and ρ its share by least squares over the last [`FOLLOWED`] samples,
+//! within ± range, is the innovation.
 //!
 //! **The null hypothesis**: given all before it and the whole motion, the mean of the innovation, cut at −[`LOSS`] and
 //! [`GAIN`], is at most m(t), and so is that of its negative, cut alike; m = margin + [`SLIP`]·range·|f(t)|. The margin

@@ -1,10 +1,10 @@
-//! Cartesian impedance at the tool, with damping of what the tool does not show.
+//! Cartesian impedance at the tool, with damping of joint motion that does not move the tool.
 
 use super::number;
 use crate::dynamics::{State, ToolModel};
 use nalgebra::{Matrix3, Matrix4, Matrix6, RealField, SMatrix, SVector, Vector3, Vector6};
 
-/// Where the tool shall be, in base axes, linear above angular.
+/// Reference motion of the tool, in base axes, linear above angular.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Goal<T> {
     /// Pose of the tool's frame, m.

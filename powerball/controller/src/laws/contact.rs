@@ -1,4 +1,4 @@
-//! Contact: external torque that the model's own error cannot be.
+//! Contact detection: external torque that is larger than the error of the model can be.
 
 use super::number;
 use crate::friction::TanhFriction;
@@ -14,7 +14,7 @@ const CYCLES: u8 = 2;
 /// known to a share, and a joint that rests may be held by all of its dry friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactDetector<T, const N: usize> {
-    /// What the observer shows without contact at rest, N·m, by joint.
+    /// Output of the observer at rest and without contact, N·m, by joint.
     pub noise: SVector<T, N>,
     /// Share of the friction that is not known.
     pub friction: T,
@@ -31,15 +31,16 @@ pub struct ContactDetector<T, const N: usize> {
 pub struct Contact<T> {
     /// The joint, from 0, whose external torque is most above its level.
     pub joint: usize,
-    /// That torque, N·m.
+    /// External torque of this joint, N·m.
     pub torque: T,
     /// The last joint, from 0, that is above its level: the contact is on its link or beyond it.
     pub link: usize,
 }
 
 impl<T: RealField + Copy, const N: usize> ContactDetector<T, N> {
-    /// With the model's friction and, by joint, what the observer shows without contact, N·m; a tenth of the friction, all
-    /// dry friction at rest and 2 % of the rigid torque may be wrong.
+    /// A detector for the model's friction `laws` and the observer's output without contact `noise`, N·m, by
+    /// joint. It tolerates an error of a tenth of the friction, of all dry friction at rest and of 2 % of the
+    /// rigid torque.
     #[must_use]
     pub fn new(laws: [TanhFriction<T>; N], noise: SVector<T, N>) -> Self {
         let [friction, sticking, rigid] = [0.1, 1.0, 0.02].map(number);

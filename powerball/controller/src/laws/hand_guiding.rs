@@ -1,4 +1,4 @@
-//! Hand guiding: weight and friction are taken off the hand, and an arm at rest is not pushed.
+//! Hand guiding: weight and friction are compensated, and an arm at rest is not pushed.
 
 use super::number;
 use crate::dynamics::{ArmModel, State};
@@ -19,8 +19,8 @@ pub struct Softening<T> {
 }
 
 impl<T: RealField + Copy> Softening<T> {
-    /// What suits a joint's friction: κ = 0.85; v₀ a fifth of the velocity at which its larger part saturates, so that no
-    /// ridge of friction is left below; a hold of 5 % of its level over 1 mrad.
+    /// Settings that suit a joint's friction: κ = 0.85; v₀ a fifth of the velocity at which its larger part
+    /// saturates, so that no ridge of friction is left below; a hold of 5 % of its level over 1 mrad.
     #[must_use]
     pub fn of(friction: &TanhFriction<T>) -> Self {
         let first = friction.gamma1.abs() >= friction.gamma3.abs();

@@ -1,8 +1,9 @@
-//! Control laws: model and state in, torque out. One file a law, each with its book, units, and what holds for its
-//! stability; none was run on hardware.
+//! Control laws: model and state in, torque out. Each file has one law with its source, its units and its
+//! conditions of stability; none was run on hardware.
 //!
-//! Every law gives the torque of the rigid arm and its feedback. What the model adds to the rigid arm (friction, effects)
-//! is added by the caller, at the reference; [`Limiter`] comes last. Nothing here allocates or panics.
+//! Every law gives the torque of the rigid arm and its feedback. The caller adds what the model has beyond
+//! the rigid arm (friction, effects), at the reference; [`Limiter`] comes last. Nothing here allocates or
+//! panics.
 
 mod cartesian;
 mod computed_torque;

@@ -22,11 +22,12 @@ impl<T: RealField + Copy> LargestPole<T> {
 /// The largest pole of B·q̈ = τ under τ = −K·q − D·q̇ that is measured at a SYNC, acts from the next one on and holds for
 /// a cycle of `period` s. Units: kg·m², N·m/rad, N·m·s/rad.
 ///
-/// The plant is double integrators with a hold, exactly discretised (Franklin, Powell, Workman: *Digital Control of Dynamic
-/// Systems*, 3rd ed., §4.3); the state is q, q̇ and the torque that acts now. Friction is left out: viscous friction only adds
-/// damping. It holds about a pose; ask it for B of the pose with the least inertia, and of others.
+/// The plant is double integrators with a hold, exactly discretised (Franklin, Powell, Workman: *Digital
+/// Control of Dynamic Systems*, 3rd ed., §4.3); the state is q, q̇ and the torque that acts now. Friction is
+/// left out: viscous friction only adds damping. The result holds near one pose; evaluate it with B of the
+/// pose with the least inertia, and of others.
 ///
-/// No number where B is singular or a gain is none.
+/// NaN if B is singular or a gain is NaN.
 #[must_use]
 pub fn largest_pole<T: RealField + Copy, const N: usize>(
     inertia: &SMatrix<T, N, N>,

@@ -1,4 +1,5 @@
-//! A planar arm of N links with point masses at their ends, in closed form, and its motion: what laws are tested on.
+//! A planar arm of N links with point masses at their ends, in closed form, and its motion; the control laws
+//! are tested on it.
 //!
 //! Absolute angles φ = S·q make it short: B = Sᵀ·[m_ij·l_i·l_j·cos(φ_i − φ_j)]·S + rotors.
 
@@ -106,7 +107,7 @@ impl<const N: usize> ToolModel<f64, N> for Planar<N> {
 pub(super) struct Sampled<'a, const N: usize> {
     arm: &'a Planar<N>,
     pub(super) state: State<f64, N>,
-    /// What pushes the joints, N·m.
+    /// External torques on the joints, N·m.
     pub(super) external: SVector<f64, N>,
     /// Coulomb friction of each joint, N·m, as tanh(500·q̇).
     pub(super) friction: f64,

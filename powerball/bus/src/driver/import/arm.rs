@@ -1,4 +1,4 @@
-//! The TOML that goes with the DCF: what the drive's file cannot know of the arm.
+//! The TOML that goes with the DCF: data of the arm that the drive's file does not have.
 
 use crate::canopen::Object;
 use serde::Deserialize;
@@ -65,7 +65,7 @@ pub struct VelocityScaleTable {
     pub numerator: i32,
     /// 0x604C:2.
     pub denominator: i32,
-    /// Of one count.
+    /// Velocity of one count, in thousandths of a degree per second.
     pub millidegrees_per_second: f64,
     /// Whether it was seen on the arm.
     pub verified_on_hardware: bool,

@@ -1,6 +1,6 @@
 //! From a drive's DCF (or EDS) and one TOML of the arm to a Rust file of constant tables, offline.
 //!
-//! What comes out is checked: every mapped object is in the dictionary with its size and may be mapped, the
+//! The result is checked: every mapped object is in the dictionary with its size and may be mapped, the
 //! bit rate is one that the drive has, and what the driver writes to make the drives watch it exists.
 //! `powerball profile` is the command.
 
@@ -25,10 +25,10 @@ pub enum ImportError {
     /// An overlay, counted from 0.
     #[error("{1}")]
     Overlay(usize, DcfError),
-    /// The TOML: in the words of its parser (with line and column), or what it says cannot be.
+    /// An error in the TOML: the message of its parser (with line and column), or a value that is impossible.
     #[error("{0}")]
     Toml(String),
-    /// What the drive's file lacks.
+    /// The drive's file lacks this.
     #[error("{0}")]
     Drive(String),
     /// The two files do not fit together.

@@ -25,7 +25,7 @@ struct Turn {
     source: String,
 }
 
-/// A quotient of two parts of an object; no second part stands for 1.
+/// A quotient of two parts of an object; a missing second part counts as 1.
 fn quotient(drive: &Dcf, index: u16, node: u8) -> Option<Turn> {
     let value = |sub| drive.value(Object::new(index, sub), node);
     let (above, below) = (value(1)?, value(2).unwrap_or(1));
@@ -51,7 +51,7 @@ fn turn(drive: &Dcf, node: u8) -> Option<Turn> {
 /// Counts in a degree of a joint, and what is to be reported about them.
 ///
 /// # Errors
-/// Where neither file gives a scale, or it is none of a joint.
+/// If neither file gives a scale, or it cannot be that of a joint.
 pub(super) fn counts_per_degree(
     drive: &Dcf,
     joint: &JointTable,

@@ -6,7 +6,7 @@ use crate::canopen::pdo::Mapping;
 use crate::cia402::{Mode, objects};
 use std::fmt::Write;
 
-/// Rows that would be longer go on in a second line.
+/// Longer rows continue on a second line.
 const LINE: usize = 110;
 
 pub(super) fn source(drive: &Dcf, arm: &Arm, constant: &str, source: &str) -> Result<String, ImportError> {

@@ -48,8 +48,8 @@ impl Flags {
         self.0 & 0x02 != 0
     }
 
-    /// Lawicel's flags have none for bus-off. An adapter that refuses a frame because of errors on the bus is off it;
-    /// bit 4, which Lawicel leaves free, says so in firmware of others.
+    /// Lawicel's flags have none for bus-off. An adapter that refuses a frame because of errors on the bus is
+    /// off it; bit 4, which Lawicel leaves free, means bus-off in firmware of other makers.
     pub(super) fn off(self, refused: bool) -> bool {
         self.0 & 0x10 != 0 || refused && self.0 & 0x80 != 0
     }
@@ -253,7 +253,7 @@ mod tests {
         assert!(Flags(0x01).overrun() && Flags(0x08).overrun() && !Flags(0xF6).overrun());
         assert!(Flags(0x20).passive() && !Flags(0xDF).passive());
         assert!(Flags(0x02).not_sent() && !Flags(0xFD).not_sent());
-        // An error on the bus alone takes nobody off it.
+        // An error on the bus alone does not mean bus-off.
         assert!(Flags(0x10).off(false) && !Flags(0x80).off(false) && Flags(0x80).off(true));
     }
 }

@@ -43,7 +43,7 @@ pub struct Slcan {
     out: VecDeque<u8>,
     clock: Clock,
     state: State,
-    /// The adapter refused something, and has not yet said why.
+    /// The adapter refused a command, and its flags are not yet known.
     refused: bool,
     /// The flags before, which reading has cleared.
     before: Flags,
@@ -234,7 +234,7 @@ impl Slcan {
                     self.ask_at = Some(self.now());
                 }
             }
-            // Nobody says why: the frame was not sent.
+            // The reason is unknown: the frame was not sent.
             Line::Refused => self.tell(Event::NotSent),
             Line::Done | Line::Version | Line::Other => {}
         }

@@ -18,12 +18,12 @@ use section::{About, Section, Types};
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// What is wrong, and in which line (from 1).
+/// An error in a file: its line (from 1) and a message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DcfError {
     /// Line of the file.
     pub line: usize,
-    /// What is wrong, and what to do.
+    /// The error, and what to do about it.
     pub message: String,
 }
 
@@ -130,7 +130,7 @@ impl Dcf {
             }
             About::Commissioning => {
                 let node = section.number_within("nodeid", 0, 255)?;
-                // 0 and 255 stand for a node without a number.
+                // 0 and 255 mean a node without a number.
                 self.node = node.filter(|node| (1..=127).contains(node)).map(|node| node as u8).or(self.node);
                 let rate = section.number_within("baudrate", 0, 10_000)?.filter(|rate| *rate > 0);
                 self.bitrate = rate.map(|rate| 1000 * rate as u32).or(self.bitrate);

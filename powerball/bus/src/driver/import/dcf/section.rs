@@ -22,10 +22,10 @@ const UNSIGNED8: u16 = 0x0005;
 /// Greatest sub-index of a value.
 const LAST_SUB: i128 = 254;
 
-/// Types that a file defines itself: their number, and the type of CiA 301 that they stand for.
+/// Types that a file defines itself: their number, and the type of CiA 301 that they rename.
 pub(super) type Types = BTreeMap<u16, u16>;
 
-/// What a section is about.
+/// The subject of a section.
 pub(super) enum About {
     /// `[1018sub2]`, or `[1018]` as sub-index 0.
     Object(Object),
@@ -52,7 +52,7 @@ pub(super) struct Section {
 /// The sections of a text, in their order.
 ///
 /// # Errors
-/// The first line that is none of a section, a key with its value, and a comment.
+/// The first line that is neither a section, nor a key with its value, nor a comment.
 pub(super) fn split(text: &str) -> Result<Vec<Section>, DcfError> {
     let mut sections = vec![Section::default()];
     for (line, text) in text.lines().enumerate().map(|(n, line)| (n + 1, line.trim())) {

@@ -69,7 +69,7 @@ fn unsigned(digits: &str) -> Option<u64> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct NoNumber;
 
-/// What an object holds in a file, by its data type.
+/// The value of an object in a file, by its data type.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     /// A whole number, a truth or a time.
