@@ -1,9 +1,9 @@
-//! Many samples at once: a loop compiled for several kinds of processor, of which the best that is there
-//! runs.
+//! Many samples at once: a loop compiled for several kinds of processor, of which the best one that the
+//! machine supports runs.
 //!
 //! The functions in a generated file's module `batch` are loops over blocks of samples. Compiled for any
-//! x86-64 they use vectors of two; inside a [`Work`] they use what the processor has (AVX2, AVX-512, NEON).
-//! The results stay the same, to the bit.
+//! x86-64 they use vectors of two; inside a [`Work`] they use the vectors that the processor has (AVX2,
+//! AVX-512, NEON). The results stay the same, to the bit.
 //!
 //! ```
 //! use powerball_logs::batch::{self, Work};
@@ -62,11 +62,11 @@
 
 /// Work on batches.
 pub trait Work {
-    /// What it gives.
+    /// The result of the work.
     type Output;
 
-    /// Does it. To be marked `#[inline(always)]`, and to call nothing large that is not: what is not inlined
-    /// into it is compiled for any processor.
+    /// Does the work. To be marked `#[inline(always)]`, and to call nothing large that is not: what is not
+    /// inlined into it is compiled for any processor.
     fn run(self) -> Self::Output;
 }
 

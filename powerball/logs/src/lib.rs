@@ -1,7 +1,7 @@
 //! From log files to rows of the regression.
 //!
-//! [`tables`] reads files, [`log`] finds an arm's signals in them and doubts them, [`signal`] filters and
-//! differentiates, [`regression`] makes rows, [`summary`] keeps of them what a fit needs.
+//! [`tables`] reads files, [`log`] finds an arm's signals in them and checks them, [`signal`] filters and
+//! differentiates, [`regression`] makes rows, [`summary`] reduces them to the statistics that a fit needs.
 
 pub mod batch;
 pub mod chain;
@@ -19,7 +19,7 @@ pub mod vector;
 
 use std::fmt;
 
-/// Who reads, in a few words, what a long computation is doing now; by default nobody.
+/// A reader of short messages about the progress of a long computation; none by default.
 #[derive(Clone, Copy, Default)]
 pub struct Progress<'a>(Option<&'a (dyn Fn(&str) + Sync)>);
 

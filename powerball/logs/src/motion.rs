@@ -1,4 +1,4 @@
-//! A sampled motion: what an arm is to follow.
+//! A sampled motion that an arm is to follow.
 
 use std::fmt::Write as _;
 
@@ -113,7 +113,7 @@ impl Motion {
         }
     }
 
-    /// As CSV with a header line: `t`, `q1…qn`, `dq1…dqn`, `ddq1…ddqn`.
+    /// The motion as CSV with a header line: `t`, `q1…qn`, `dq1…dqn`, `ddq1…ddqn`.
     pub fn to_csv(&self) -> String {
         let mut out = String::from("t");
         for name in ["q", "dq", "ddq"] {

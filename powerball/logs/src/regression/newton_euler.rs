@@ -1,5 +1,5 @@
-//! A numeric Newton–Euler regressor, independent of the generator: for arms that are tried and not derived, and the
-//! plant and the check of tests.
+//! A numeric Newton–Euler regressor, independent of the generator: for arms that are tried without a
+//! derivation, and for the plant and the reference in tests.
 
 use dyngen::Arm;
 use dyngen::arm::{Convention, JointKind};

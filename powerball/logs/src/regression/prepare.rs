@@ -65,7 +65,7 @@ pub struct Data<'a> {
     pub inactive: Vec<Option<String>>,
     /// Pieces of logs, and joints of some logs, that were left out, in words.
     pub left_out: Vec<String>,
-    /// What was left out or done, in words.
+    /// Notes on samples that were left out and on corrections.
     pub notes: Vec<String>,
     /// Whether each joint has a fit of its own (see [`Data::per_joint_fit`]).
     pub per_joint: bool,
@@ -112,11 +112,12 @@ impl<'a> Data<'a> {
         Data::in_bands(body, logs, options, 1, correct)?.pop().unwrap_or(Err(DataError::TooShort))
     }
 
-    /// Prepares logs in `count` bands: the one of the options, which is one of [`BANDS`] where there is more than
-    /// one, and those that are made of it. What can be used in a band may be too little in a narrower one.
+    /// Prepares logs in `count` bands: the band of the options (one of [`BANDS`] if `count` is more than
+    /// one), and those that are made of it. Samples that suffice for a band may be too few for a narrower
+    /// one.
     ///
     /// # Errors
-    /// As [`Data::new`], where nothing usable remains in any band.
+    /// The errors of [`Data::new`], if nothing usable remains in any band.
     pub fn in_bands(
         body: &'a RigidArm,
         logs: &[Log],
@@ -559,7 +560,8 @@ fn joint_rows(
     all
 }
 
-/// Numbers of a regressor that are held at a time: a long recording's is computed anew for each few joints.
+/// Numbers of a regressor that are held at a time: that of a long recording is computed again for each few
+/// joints.
 const MOST_NUMBERS: usize = 12 << 20;
 /// Samples of a regressor of which some joints are kept.
 const AT_ONCE: usize = 8192;

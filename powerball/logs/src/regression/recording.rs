@@ -26,7 +26,7 @@ pub struct Recording {
     pub torque: Vec<Vec<f64>>,
     /// Temperatures, by joint, °C, where they were logged.
     pub temperature: Option<Vec<Vec<f64>>>,
-    /// What positions were smoothed to, Hz.
+    /// Cutoff of the filter that smoothed positions, Hz.
     pub smoothing: f64,
     /// Joints.
     pub dof: usize,

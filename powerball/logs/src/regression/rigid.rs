@@ -1,6 +1,6 @@
 //! The rigid arm of a file at run time: columns of its minimal set and of what lies outside it.
 //!
-//! Also here: what level gravity hides.
+//! [`RigidArm`] also gives the parameters that a vertical gravity hides.
 
 use crate::log::Motors;
 use dyngen::arm::ParameterKind;
@@ -37,7 +37,7 @@ pub struct RigidArm {
 #[derive(Debug)]
 struct Wide {
     evaluator: Evaluator,
-    /// Where each parameter of [`Arm::all_parameters`] stands among the columns.
+    /// The column of each parameter of [`Arm::all_parameters`].
     column: Vec<Option<usize>>,
 }
 
@@ -67,7 +67,7 @@ impl RigidArm {
         RigidArm::mounted(arm, arm)
     }
 
-    /// As [`RigidArm::new`], for an arm under another gravity than that of its file.
+    /// Like [`RigidArm::new`], for an arm under another gravity than that of its file.
     ///
     /// # Errors
     /// As [`RigidArm::new`].
@@ -108,8 +108,8 @@ impl RigidArm {
         Arm { gravity: self.filed.clone(), ..self.arm().clone() }
     }
 
-    /// The parameters of the minimal set as combinations of those of the same arm's under another gravity, by
-    /// row; `None` where these do not determine them.
+    /// The parameters of the minimal set as combinations of those of the same arm under another gravity, by
+    /// row; `None` if the latter do not determine them.
     #[must_use]
     pub fn parameters_from(&self, other: &RigidArm) -> Option<Vec<Vec<f64>>> {
         let sums = |body: &RigidArm| Some(body.model.sums(body.model.set(SetKind::Minimal).ok()?));
@@ -238,7 +238,8 @@ impl RigidArm {
         Some(self.on_motors(pick(&wides[axis], chosen, &q, &v, &a, self.dof())?, chosen.len()))
     }
 
-    /// Where a force on the last link is taken to act, in its frame, m: the tool of the arm file, else the origin.
+    /// The point at which a force on the last link is assumed to act, in its frame, m: the tool of the arm
+    /// file, else the origin.
     #[must_use]
     pub fn force_point(&self) -> [f64; 3] {
         let on_last = self.arm().tool_carrier() + 1 == self.arm().links();

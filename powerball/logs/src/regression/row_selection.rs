@@ -1,7 +1,7 @@
-//! Which samples of a joint become rows: those in which it moves and its torque says something.
+//! Which samples of a joint become rows: those in which it moves and its torque carries information.
 //!
-//! Also here: joints whose samples show nothing, and why; what is to be reported about joints that rest in
-//! the logs.
+//! The module also finds joints whose samples carry no information, with the reason, and the notes about
+//! joints that rest in the logs.
 
 use super::rows::{saturated, saturation_notes};
 use super::{JointRows, Recording};
@@ -100,9 +100,9 @@ const LEAST_TRAVEL: [f64; 2] = [0.05, 0.01];
 /// Why a joint's samples cannot be used.
 #[derive(Clone, Debug, PartialEq)]
 enum Inactive {
-    /// It does not move.
+    /// The joint does not move.
     Still,
-    /// It moves by so little, with the least that would do.
+    /// The joint moves too little: its travel, and the least travel that suffices.
     HardlyMoves(f64, f64),
     /// The torque never changes while the joint moves.
     Dead,
@@ -173,7 +173,7 @@ pub(super) fn dead(recording: &Recording, joint: usize) -> bool {
 
 // What is to be reported about joints that rest in the logs.
 
-/// With fewer rows than these nothing is reported about a joint: 0.8 s of motion in the widest band.
+/// Least number of rows of a joint for a result about it: 0.8 s of motion in the widest band.
 pub const FEWEST_ROWS: usize = 14;
 
 /// A note where a joint with `rows` rows of all `samples` in the band rests in most or much of them. `limit`
@@ -198,7 +198,7 @@ pub fn rest_note(joint: JointNumber, rows: usize, samples: usize, limit: Option<
     })
 }
 
-/// What was left out, and what is to be reported about joints that rested.
+/// Notes on samples that were left out, and on joints that rested.
 pub(super) fn notes(
     left_out: &[String],
     recordings: &[Recording],

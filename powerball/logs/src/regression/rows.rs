@@ -1,7 +1,7 @@
 //! The rows of each joint: which samples count, and where blocks and logs begin.
 //!
-//! Also here: stretches in which a joint's torque stays at its limit; a fit of each joint by itself, for logs that
-//! repeat one path.
+//! The module also finds stretches in which a joint's torque is saturated, and makes the rows for a separate
+//! fit of each joint, for logs that repeat one path.
 
 use super::Recording;
 use super::prepare::Data;
@@ -23,7 +23,7 @@ pub struct Block {
     pub rows: Vec<Range<usize>>,
 }
 
-/// What the samples of one joint say.
+/// The rows of one joint.
 #[derive(Clone, Debug)]
 pub struct JointRows {
     /// Torque in the band, N·m.
@@ -123,8 +123,8 @@ impl Column {
     }
 }
 
-// Stretches in which a joint's torque stays at its limit: what the drive could not give, or the sensor not
-// show, says nothing of the arm.
+// Stretches in which a joint's torque stays at its limit: such samples show the limit of the drive or the
+// sensor, not the arm.
 
 /// A torque that stays at the largest or the least value of all logs for this long was cut there, s: measured
 /// torque that moves by its noise and its resolution does not stay.
@@ -176,11 +176,11 @@ pub(super) fn saturation_notes(logs: &[Log], joint: usize, spans: &[Vec<[f64; 2]
 
 // A fit of each joint by itself, for logs that repeat one path.
 //
-// One path, however often it is run, tells little of a rigid body, and whatever else depends on positions is
-// one more function of that path. Where that does not fit, what it leaves is large and smooth on every
-// joint, and what changes from one repeat to the next, or within a motor's turn, drowns in it. Then each
-// joint is given inertial parameters of its own, an offset, and a slope with its position: what the path
-// alone can explain is taken to be explained, and only what goes beyond is asked for.
+// One path, however often it is run, determines few parameters of a rigid body, and any other effect that
+// depends on positions is one more function of that path. If the rigid body does not fit, its residual is
+// large and smooth on every joint, and it hides everything that changes from one repeat to the next, or
+// within a motor's turn. Then each joint is given inertial parameters of its own, an offset, and a slope with
+// its position: all that the path alone can explain counts as explained, and only the rest is examined.
 
 impl Data<'_> {
     /// These logs with columns of its own for every joint: the minimal set, an offset and its position.

@@ -1,4 +1,4 @@
-//! A signal by joint and row: torques, and what a model leaves of them.
+//! A signal by joint and row: torques, or the residual of a model.
 
 use super::{Column, Data};
 use std::ops::{Deref, DerefMut};
@@ -49,7 +49,7 @@ impl Signals {
         }
     }
 
-    /// What is left of it without another one.
+    /// This signal minus another one.
     #[must_use]
     pub fn without(&self, other: &[Vec<f64>]) -> Signals {
         let mut left = self.clone();

@@ -1,12 +1,12 @@
 //! Butterworth low-pass filters of any even order, as biquads, and their zero-phase use.
 //!
-//! Also here: a recursive filter of second order.
+//! The module also has a recursive filter of second order.
 
 use super::filter;
 use std::f64::consts::PI;
 
-/// Filters samples in place through `N` sections, which start settled on the first sample, so a constant
-/// stays as it is.
+/// Filters samples in place through `N` sections, which start settled on the first sample, so a constant is
+/// not changed.
 ///
 /// A section waits for its own last result alone: the sections of one loop are worked on at the same time.
 fn run<'x, const N: usize>(sections: [Biquad; N], samples: impl Iterator<Item = &'x mut f64>) {

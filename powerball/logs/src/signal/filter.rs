@@ -1,6 +1,6 @@
 //! The band of an analysis: one low-pass filter and one decimation for every signal and every column alike.
 //!
-//! Also here: a recursive filter over the pieces of one long signal at the same time.
+//! The module also has a recursive filter that runs over the pieces of one long signal at the same time.
 
 use super::Butterworth;
 use super::butterworth::Biquad;
@@ -75,7 +75,7 @@ impl Band {
         Band::with_ends(cutoff, rate, ENDS)
     }
 
-    /// As [`Band::new`], where `ends` seconds are left out at each end.
+    /// Like [`Band::new`], with `ends` seconds left out at each end.
     #[must_use]
     pub fn with_ends(cutoff: f64, rate: f64, ends: f64) -> Band {
         let wider = BANDS.iter().position(|band| *band == cutoff).unwrap_or(0);
@@ -118,7 +118,8 @@ impl Band {
         self.pass_bands(x, 1).pop().unwrap_or_default()
     }
 
-    /// As [`Band::pass`], for the last `count` of the bands that this one is made of, itself the last.
+    /// Like [`Band::pass`], for the last `count` of the bands that this one is made of, with this one as the
+    /// last.
     #[must_use]
     pub fn pass_bands(&self, x: &[f64], count: usize) -> Vec<Vec<f64>> {
         let skipped = self.stages.len().saturating_sub(count);
@@ -150,7 +151,8 @@ impl Band {
         mean_over_frequencies(rate, |f| self.amplitude(f, rate).powi(2)).sqrt()
     }
 
-    /// As [`Band::white_share`], for what passes `wider`, a band with a higher cutoff, and not this one.
+    /// Like [`Band::white_share`], for the noise that passes `wider`, a band with a higher cutoff, but not
+    /// this band.
     #[must_use]
     pub fn white_share_between(&self, wider: &Band, rate: f64) -> f64 {
         mean_over_frequencies(rate, |f| (wider.amplitude(f, rate) - self.amplitude(f, rate)).powi(2)).sqrt()

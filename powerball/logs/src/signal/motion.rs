@@ -1,6 +1,7 @@
-//! Phases of rest: friction is undetermined while a joint stands still, so those samples say nothing of it.
+//! Phases of rest: friction is undetermined while a joint stands still, so those samples carry no information
+//! about it.
 //!
-//! Also here: where a joint turns back, and the band that its motion occupies.
+//! The module also finds the samples at which a joint reverses, and the band of its motion.
 
 use super::Butterworth;
 use rustfft::FftPlanner;

@@ -30,7 +30,7 @@ pub fn cubic(t: &[f64], x: &[f64], start: f64, step: f64, count: usize) -> Vec<f
     onto_grid(t, start, step, count, |i, at| cubic_at(t, x, i, at))
 }
 
-/// As [`cubic`], at one time between samples `i` and `i + 1`.
+/// Like [`cubic`], at one time between samples `i` and `i + 1`.
 #[must_use]
 pub fn cubic_at(t: &[f64], x: &[f64], i: usize, at: f64) -> f64 {
     let linear = || x[i] + (x[i + 1] - x[i]) * (at - t[i]) / (t[i + 1] - t[i]);

@@ -1,6 +1,6 @@
-//! Summaries on disk: one line of JSON that says what it is, then the factors, packed.
+//! Summaries on disk: one line of JSON that describes the summary, then the packed factors.
 //!
-//! Also here: factors as bits.
+//! The module also packs factors into bits.
 
 use super::{Columns, Identity, NODES, OCTAVES, Octaves, Powers, RFactor, Steepness, Summary, fnv};
 use serde::{Deserialize, Serialize};
@@ -16,10 +16,10 @@ const MOST_JOINTS: usize = 64;
 /// Why a summary is of no use here.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SummaryError {
-    /// It is no summary, or a damaged one: why.
+    /// The file is not a summary, or it is damaged: the reason.
     #[error("{0}")]
     Unreadable(String),
-    /// It is of something else: what differs.
+    /// The summary does not belong to this arm or these options: the difference.
     #[error("{0}")]
     Differs(String),
 }
@@ -47,7 +47,7 @@ struct Head {
     /// Name and seconds.
     logs: Vec<(String, f64)>,
     samples: u64,
-    /// By joint: why a log said nothing of it.
+    /// By joint: the reason why a log has no information about it.
     #[serde(rename = "silent")]
     inactive: Vec<Option<String>>,
     /// By joint and octave.
@@ -55,7 +55,7 @@ struct Head {
     spectrum: Vec<Powers>,
     /// Bytes that follow.
     bytes: usize,
-    /// Of them.
+    /// Checksum of these bytes.
     checksum: String,
 }
 
@@ -163,7 +163,7 @@ impl Summary {
         let width = Columns { inertial: head.parameters.len() }.width();
         let joints = head.steepness.len();
         let (numbers, after) = numbers.split_at(head.bytes.min(numbers.len()));
-        // Zeros take little room in the file: what says that there are billions is damaged.
+        // Zeros take little room in the file: a file that claims billions of rows is damaged.
         let shaped = head.nodes == NODES
             && joints <= MOST_JOINTS
             && head.parameters.len() <= 16 * MOST_JOINTS

@@ -1,9 +1,9 @@
-//! A log reduced to the sufficient statistics of its fit: R factors of the QR decomposition of its rows, of
-//! one size however long it was.
+//! A log reduced to the sufficient statistics of its fit: R factors of the QR decomposition of its rows,
+//! whose size does not depend on the length of the log.
 //!
-//! What is fixed when a log is reduced: the arm, the parameter set, the bands. What is not: which of them
-//! counts (see [`Bands`]), friction's steepnesses (see [`Steepness`]), the joints' weights, and the colour of
-//! the noise (see [`Octaves`]).
+//! The reduction fixes the arm, the parameter set and the bands. It does not fix which band is used (see
+//! [`Bands`]), the steepnesses of friction (see [`Steepness`]), the joints' weights, and the colour of the
+//! noise (see [`Octaves`]).
 
 mod file;
 mod octaves;
@@ -18,7 +18,7 @@ pub use r_factor::RFactor;
 pub use reduce::parts;
 pub use reduce::{BANDS, Bands, Columns, NODES, Powers, Steepness};
 
-/// What must agree for summaries to be of the same thing.
+/// The arm and the options of a summary: they must agree before summaries are added.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identity {
     /// The arm's name.
@@ -40,19 +40,19 @@ pub struct Identity {
 /// Logs of one arm, reduced.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
-    /// Of what.
+    /// The arm and the options of the summary.
     pub identity: Identity,
     /// The logs that went in, and the seconds of each.
     pub logs: Vec<(String, f64)>,
     /// Samples in the band, resting joints among them.
     pub samples: u64,
-    /// By joint: why a log said nothing of it, in words.
+    /// By joint: the reason why a log has no information about it.
     pub inactive: Vec<Option<String>>,
     /// The rows of each joint.
     pub joints: Vec<Octaves>,
     /// The end of each joint's band, Hz.
     pub joint_bands: Vec<f64>,
-    /// Of the widest of several bands: see [`Bands::spectrum`].
+    /// Spectrum of the widest of several bands: see [`Bands::spectrum`].
     pub spectrum: Vec<Powers>,
 }
 
@@ -60,7 +60,7 @@ pub struct Summary {
 const ORDINARY_SPEED: f64 = 1.0;
 
 impl Summary {
-    /// Of no log yet.
+    /// An empty summary.
     #[must_use]
     pub fn new(body: &RigidArm, options: &DataOptions) -> Summary {
         let arm = body.filed();
@@ -105,7 +105,7 @@ impl Summary {
     }
 
     /// These rows in the columns of the minimal set of `general`, which is the same arm under a gravity
-    /// whose parameters determine those of `own`, in whose columns the rows are; `None` where they do not.
+    /// whose parameters determine those of `own`, in whose columns the rows are; `None` if they do not.
     #[must_use]
     pub fn in_set(&self, own: &RigidArm, general: &RigidArm) -> Option<Summary> {
         let rows = own.parameters_from(general)?;

@@ -1,8 +1,8 @@
-//! Rows in octaves of time: what a coloured residual costs can be computed afterwards.
+//! Rows in octaves of time: the cost of a coloured residual can be computed afterwards.
 //!
 //! Neighbouring rows are turned into their sum and their difference over √2, the sums again with their
 //! neighbours, and so on (Haar's transform). It is orthogonal, so the factors of all octaves together are the
-//! factor of the rows; and what is left of a residual in each octave is the power of its noise there,
+//! factor of the rows; and the part of a residual in each octave is the power of its noise there,
 //! whatever model is found later. Noise of robots has colour but hardly any memory between octaves, which is
 //! all that standard errors need.
 
@@ -32,7 +32,7 @@ pub struct Octaves {
 }
 
 impl Octaves {
-    /// Of no rows.
+    /// Octaves without rows.
     #[must_use]
     pub fn new(width: usize) -> Octaves {
         Octaves { levels: vec![RFactor::new(width); OCTAVES] }
@@ -77,7 +77,7 @@ impl Octaves {
                 .iter_mut()
                 .map(|x| {
                     let (mut differences, slower) = halved(x);
-                    // A row without a neighbour stays as it is.
+                    // A row without a neighbour is not changed.
                     differences.extend_from_slice(&x[count - count % 2..]);
                     *x = slower;
                     differences
@@ -110,7 +110,7 @@ impl Octaves {
         self.levels.iter_mut().for_each(|level| level.round(&steps));
     }
 
-    /// These rows with combinations of their columns, as [`RFactor::combined`].
+    /// These rows with combinations of their columns, like [`RFactor::combined`].
     #[must_use]
     pub fn combined(&self, columns: &[Vec<(usize, f64)>]) -> Octaves {
         Octaves { levels: self.levels.iter().map(|level| level.combined(columns)).collect() }

@@ -47,7 +47,7 @@ impl RFactor {
             .collect()
     }
 
-    /// Rounds each column to multiples of its step; a step of 0 leaves it as it is.
+    /// Rounds each column to multiples of its step; a step of 0 does not change it.
     pub fn round(&mut self, steps: &[f64]) {
         for (column, step) in self.columns.chunks_exact_mut(self.width.max(1)).zip(steps) {
             if *step > 0.0 {

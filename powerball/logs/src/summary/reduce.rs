@@ -1,6 +1,6 @@
 //! Logs into factors: one log after another, a long one part by part, so memory does not grow.
 //!
-//! Also here: columns tanh(γ·q̇) for every γ at once; logs reduced in several bands.
+//! The module also makes the columns tanh(γ·q̇) for every γ at once, and reduces logs in several bands.
 
 use super::{Octaves, Summary, SummaryError};
 use crate::log::Log;
@@ -71,10 +71,10 @@ impl Columns {
 }
 
 impl Summary {
-    /// Takes a log in. Returns what was left out of it, in words.
+    /// Adds a log. Returns notes on the samples that were left out.
     ///
     /// # Errors
-    /// [`DataError`] where nothing of the log can be used; nothing has been taken in then.
+    /// [`DataError`] where nothing of the log can be used; nothing has been added then.
     pub fn push(
         &mut self,
         body: &RigidArm,
@@ -107,8 +107,8 @@ impl Summary {
     }
 }
 
-/// Takes a log into summaries of bands, each made of the one before, the first that of the
-/// options. Returns what was left out of it in the first, in words.
+/// Adds a log to the summaries of several bands. Each band is made of the one before; the first is that of
+/// the options. Returns notes on the samples that were left out in the first band.
 ///
 /// # Errors
 /// [`DataError`] where nothing of the log can be used in the first band; nothing has been taken in then. A
@@ -208,13 +208,13 @@ fn part(log: &Log, range: std::ops::Range<usize>) -> Log {
 
 // Columns tanh(γ·q̇) for every γ at once.
 //
-// A reduced log cannot be asked for the column of a steepness that is found later. As a function of ln γ the
+// A reduced log cannot give the column of a steepness that is found later. As a function of ln γ the
 // column is smooth (it is analytic in the strip |Im ln γ| < π/2), so its interpolant at Chebyshev's nodes
 // comes near it as fast as a geometric series: with [`NODES`] nodes over [`Steepness::range`] no value is
 // off by more than 4e-5 (a test finds it). The columns at the nodes therefore hold those of all steepnesses
 // between, and their derivatives, as linear combinations.
 
-/// Columns that stand for all steepnesses.
+/// Number of columns that represent all steepnesses.
 pub const NODES: usize = 32;
 /// The range of a joint whose velocity limit is v: nearly straight up to v, and a step for all that is
 /// measurable.
@@ -254,7 +254,7 @@ impl Steepness {
         std::array::from_fn(|k| (middle + half * node(k).cos()).exp())
     }
 
-    /// What of each node's column makes the column of `gamma`.
+    /// Weights of the nodes' columns whose sum is the column of `gamma`.
     #[must_use]
     pub fn weights(&self, gamma: f64) -> [f64; NODES] {
         let angle = self.angle(gamma);
@@ -265,7 +265,7 @@ impl Steepness {
         })
     }
 
-    /// As [`Self::weights`], for the column's derivative by ln γ.
+    /// Like [`Self::weights`], for the column's derivative by ln γ.
     #[must_use]
     pub fn slopes(&self, gamma: f64) -> [f64; NODES] {
         let (_, half) = self.scale();
@@ -332,7 +332,7 @@ mod steepness_tests {
 
 // Logs reduced in several bands: in which of them they speak of a model is decided when there is one.
 
-/// A model's power and that of what it leaves, (N·m)², between neighbouring bands.
+/// The power of a model's torque and of its residual, (N·m)², between neighbouring bands.
 pub type Powers = [[f64; 2]; BANDS.len() - 1];
 
 /// Logs of one arm, reduced in each of [`BANDS`].
@@ -342,7 +342,7 @@ pub struct Bands {
 }
 
 impl Bands {
-    /// Of no log yet; the band of `options` does not count.
+    /// Empty summaries; the band of `options` is not used.
     #[must_use]
     pub fn new(body: &RigidArm, options: &DataOptions) -> Bands {
         Bands { bands: BANDS.iter().map(|band| Summary::new(body, &with(options, *band))).collect() }
@@ -372,7 +372,7 @@ impl Bands {
     }
 
     /// By joint and octave between neighbouring bands, from fast to slow: the power of a model's torque
-    /// there, and of what it leaves. Summed over logs, each with a model of its own.
+    /// there, and of its residual. Summed over logs, each with its own model.
     #[must_use]
     pub fn spectrum(&self) -> &[Powers] {
         &self.bands[0].spectrum
@@ -383,7 +383,7 @@ impl Bands {
         self.bands[0].spectrum = spectrum.to_vec();
     }
 
-    /// Takes a log in. Returns what was left out of it, in words.
+    /// Adds a log. Returns notes on the samples that were left out.
     ///
     /// # Errors
     /// [`DataError`] where nothing of the log can be used; nothing has been taken in then. A log that is too

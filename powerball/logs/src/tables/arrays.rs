@@ -1,4 +1,4 @@
-//! Named arrays as a table: what archives of NumPy and MATLAB hold.
+//! Named arrays as a table: the content of archives of NumPy and MATLAB.
 //!
 //! An array of N numbers is a column of its name, one of N × k numbers is k columns `name1` … `namek`. An
 //! array of k texts (`joints`, `names`) names the columns of N × k arrays: `q.shoulder`.
@@ -35,7 +35,7 @@ pub(super) fn one(
 /// The arrays as one table, and those that have no place in it. `left_out`: those that could not be read.
 ///
 /// # Errors
-/// Why there is no room for it.
+/// The reason why the memory limit does not allow it.
 pub(super) fn table(
     arrays: Vec<Array>,
     mut left_out: Vec<String>,

@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// What a file begins with that Zstandard compressed.
+/// The first bytes of a file that Zstandard compressed.
 pub(super) const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
 /// The description that rosbag2 writes of a recording, in its folder.
 const METADATA: &str = "metadata.yaml";
@@ -136,7 +136,8 @@ fn unlisted(folder: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(files.into_iter().map(|(_, path)| path).collect())
 }
 
-/// A file's content as a file of its own, which goes when it is dropped; none where it is not compressed.
+/// A file's unpacked content as a temporary file, which is deleted when dropped; `None` if it is not
+/// compressed.
 fn unpacked(path: &Path) -> io::Result<Option<tempfile::NamedTempFile>> {
     let mut file = File::open(path)?;
     let mut head = Vec::new();
@@ -149,7 +150,7 @@ fn unpacked(path: &Path) -> io::Result<Option<tempfile::NamedTempFile>> {
     Ok(Some(out))
 }
 
-/// What a compressed file begins with.
+/// The first bytes of the content of a compressed file.
 pub(super) fn unpacked_head(path: &Path, length: u64) -> io::Result<Vec<u8>> {
     let mut head = Vec::new();
     zstd::Decoder::new(File::open(path)?)?.take(length).read_to_end(&mut head)?;

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
 
-/// What a bag begins with.
+/// The first bytes of a bag.
 pub(super) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 /// The first record of a bag fills this many bytes.
 const HEAD: u64 = 4096;
@@ -79,7 +79,8 @@ fn has_index(path: &Path) -> io::Result<()> {
     }
 }
 
-/// What the largest of a bag's chunks says that it unpacks to, bytes; room is made for it. A bag that is torn ends before its end.
+/// The unpacked size that the largest of a bag's chunks states, bytes; this memory is allocated. A truncated
+/// bag ends early.
 fn largest_chunk(path: &Path) -> io::Result<u64> {
     let mut file = BufReader::new(File::open(path)?);
     file.seek_relative(MAGIC.len() as i64)?;

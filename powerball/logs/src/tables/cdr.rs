@@ -1,7 +1,8 @@
 //! Messages of ROS as their bytes are: CDR of both versions (ROS 2) and the serialisation of ROS 1.
 //!
-//! Crates that read CDR know its first version alone, with types that are known when they are compiled (`cdr`, `cdr-encoding`), or
-//! build a tree of each message (`re_ros_msg`, which asks for a newer Rust than this workspace).
+//! Crates that read CDR know its first version alone, with types that are known when they are compiled
+//! (`cdr`, `cdr-encoding`), or build a tree of each message (`re_ros_msg`, which needs a newer Rust than this
+//! workspace).
 
 use super::schema::Bits;
 use std::borrow::Cow;

@@ -48,7 +48,7 @@ pub(super) struct Rows<'s, S> {
     count: usize,
     /// By the first rows.
     known: Option<Known>,
-    /// Of the file that is read.
+    /// Rows of the file that is read.
     expected: usize,
     /// Rows that it says are still to come.
     claimed: usize,
@@ -82,7 +82,7 @@ impl<'s, S: RowSink> Rows<'s, S> {
             }])
         };
         let length = input.len();
-        // What Arrow noted of its own types in addition to those of Parquet says nothing more about numbers.
+        // Arrow's notes on its own types, in addition to those of Parquet, add nothing about numbers.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let builder = guarded(|| ParquetRecordBatchReaderBuilder::try_new_with_options(input, options))
             .map_err(|e| unreadable(None, &e))?;

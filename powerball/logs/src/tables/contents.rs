@@ -1,6 +1,6 @@
-//! A file's format, by what it begins with, and its tables.
+//! A file's format, by its first bytes, and its tables.
 //!
-//! Also here: what is odd about a log, and why one cannot be used.
+//! [`Finding`] is a note on a fault of a log, [`LogError`] the reason why a log cannot be used.
 
 #[cfg(feature = "topics")]
 use super::bag;
@@ -54,7 +54,7 @@ pub struct Contents {
     pub format: Format,
     /// One table, or one a topic.
     pub tables: Vec<Table>,
-    /// What is odd about the file itself.
+    /// Notes on faults of the file itself.
     pub notes: Vec<Finding>,
 }
 
@@ -76,11 +76,12 @@ impl Format {
         }
     }
 
-    /// What the file at a path begins with; of the folder of a recording, its first file, and of a compressed recording
-    /// what is in it. A folder with a `meta/info.json` is a dataset of LeRobot's, and so is that file.
+    /// The format of the file at a path, by its first bytes. For the folder of a recording, its first file
+    /// decides, and for a compressed recording its content. A folder with a `meta/info.json` is a dataset of
+    /// LeRobot's, and so is that file.
     ///
     /// # Errors
-    /// Where it cannot be read, is empty, or is none of these.
+    /// If the file cannot be read, is empty, or has none of the formats.
     pub fn of_file(path: &Path) -> Result<Format, LogError> {
         let failed =
             |e: std::io::Error| LogError::of_file(&shown(path), "file", format!("cannot be read: {e}"));
@@ -117,10 +118,10 @@ impl Format {
     }
 }
 
-/// What describes a dataset of LeRobot's, within its folder.
+/// The file that describes a dataset of LeRobot, within its folder.
 pub(super) const INFO: &str = "meta/info.json";
 
-/// The folder of such a dataset, where a path is one or its `meta/info.json`.
+/// The folder of a dataset of LeRobot, if a path is this folder or its `meta/info.json`.
 pub(super) fn dataset(path: &Path) -> Option<PathBuf> {
     let folder = if path.ends_with(INFO) { path.ancestors().nth(2)? } else { path };
     folder.join(INFO).is_file().then(|| folder.to_path_buf())
@@ -142,8 +143,8 @@ pub fn read_contents(path: &Path) -> Result<Contents, LogError> {
     read_topics(&mut Place::of(path)?, &shown(path), None)
 }
 
-/// As [`read_contents`], with the topics of some names alone, where a file has topics; others are counted.
-/// `file` stands in messages.
+/// Like [`read_contents`], but reads only the topics of some names, if a file has topics; others are counted.
+/// `file` is the name in messages.
 pub(crate) fn read_topics(place: &mut Place, file: &str, only: Only<'_>) -> Result<Contents, LogError> {
     let (format, path) = (place.format, place.path.clone());
     let failed = |e: std::io::Error| LogError::of_file(file, "file", format!("cannot be read: {e}"));
@@ -262,7 +263,7 @@ pub struct Finding {
     pub line: Option<usize>,
     /// The column or quantity.
     pub quantity: String,
-    /// What was found, what was done about it, what to do.
+    /// The fault, how it was handled, and what to do.
     pub message: String,
 }
 

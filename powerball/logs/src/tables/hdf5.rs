@@ -1,4 +1,4 @@
-//! HDF5: files of MATLAB's version 7.3, which are such, and those of others, with an array a quantity.
+//! HDF5: files of MATLAB's version 7.3 and of other programs, with one array for each quantity.
 //!
 //! The arrays of a group are a table, with those of the groups in it as `group.array`. Where a file has several groups that have
 //! none above them, as a file of recorded demonstrations has, each is a table with the group's path as its name.

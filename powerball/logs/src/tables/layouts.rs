@@ -1,5 +1,5 @@
-//! How programs that show recordings are to arrange an MCAP of ours: a layout of Foxglove's and one of PlotJuggler's, by the
-//! topics and joints that the file has.
+//! Layouts for programs that show our MCAP recordings: one for Foxglove and one for PlotJuggler, by the
+//! topics and joints of the file.
 
 use serde_json::{Map, Value, json};
 use std::io;
@@ -9,7 +9,7 @@ use std::path::Path;
 const COLOURS: [&str; 8] =
     ["#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#e377c2"];
 
-/// What an MCAP holds.
+/// The content of an MCAP.
 #[derive(Clone, Copy, Debug)]
 pub struct Held<'a> {
     /// The names of its joints, as `/joint_states` has them.
@@ -123,7 +123,7 @@ fn foxglove(columns: &[Vec<Plot<'_>>; 2]) -> Value {
 }
 
 fn plotjuggler(columns: &[Vec<Plot<'_>>; 2]) -> String {
-    // It computes rates only where a person asks for it.
+    // PlotJuggler computes rates only on request of the user.
     let drawn = |plot: &&Plot<'_>| plot.lines.iter().any(|line| !matches!(line.of, Of::Rate(_)));
     let columns = columns.each_ref().map(|plots| plots.iter().filter(drawn).collect::<Vec<_>>());
     let mut text = String::from("<?xml version='1.0' encoding='UTF-8'?>\n<root>\n");

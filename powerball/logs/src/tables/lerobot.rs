@@ -94,7 +94,7 @@ pub(super) struct Dataset {
     at: Option<(usize, usize)>,
     /// The number of the present one, and its last time.
     last: Option<(f64, f64)>,
-    /// What is added to times, s.
+    /// Shift that is added to times, s.
     shift: f64,
     /// How many there were.
     pub(super) episodes: usize,

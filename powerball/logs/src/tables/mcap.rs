@@ -1,8 +1,9 @@
 //! MCAP files, the default storage of rosbag2 (<https://mcap.dev/spec>).
 //!
-//! A file with an index is read chunk by chunk, and chunks without a topic that is read stay where they are: their messages are
-//! counted by the index, or not at all where some topics alone are asked for. A file without one, as a program that died leaves it, is read from its beginning. Either way a
-//! damaged chunk, by its checksum or by what it unpacks to, loses its own messages only.
+//! A file with an index is read chunk by chunk, and chunks without a topic that is read stay where they are:
+//! their messages are counted by the index, or not at all if only some topics are requested. A file without
+//! an index, as a program that crashed leaves it, is read from its beginning. Either way a damaged chunk, by
+//! its checksum or by what it unpacks to, loses its own messages only.
 
 use super::messages::Topics;
 use ::mcap::records::{ChunkIndex, Record, op};
@@ -28,7 +29,7 @@ const SHORTEST: u64 = 2;
 /// Bytes that are read ahead where records follow each other.
 const AHEAD: u64 = 256 << 10;
 
-/// Where the bytes of a file come from.
+/// A source of the bytes of a file.
 pub(super) trait Source {
     /// How many there are.
     fn length(&mut self) -> io::Result<u64>;
@@ -54,7 +55,7 @@ impl Source for File {
 struct Cursor<'s, S> {
     source: &'s mut S,
     at: u64,
-    /// What was read ahead, and where it begins.
+    /// The bytes that were read ahead, and the offset at which they begin.
     window: (u64, Vec<u8>),
 }
 
@@ -88,7 +89,7 @@ pub(super) fn read(path: &Path, topics: &mut Topics) -> io::Result<Vec<String>> 
     read_from(&mut File::open(path)?, topics)
 }
 
-/// As [`read`], wherever the bytes come from.
+/// Like [`read`], from any source of bytes.
 pub(super) fn read_from(source: &mut impl Source, topics: &mut Topics) -> io::Result<Vec<String>> {
     let mut records = Records::new(topics);
     let all = match summary(source) {
@@ -327,8 +328,9 @@ impl<'t> Records<'t> {
         Ok(())
     }
 
-    /// A chunk that Zstandard compressed, as one that is not: it takes what it holds and not what it says to hold. None for any
-    /// other that says no more than it can hold; why it is damaged where it does. A chunk that there is no room for ends the file.
+    /// Unpacks a chunk that Zstandard compressed: its real size counts, not the size that it states. `None`
+    /// for any other chunk that states no more than it can hold, and the reason of the damage for one that
+    /// states more. A chunk beyond the memory limit ends the file.
     fn unpacked(&self, bytes: &[u8]) -> io::Result<Result<Option<Vec<u8>>, String>> {
         let Some(chunk) = Chunk::of(bytes) else { return Ok(Ok(None)) };
         if chunk.size > LARGEST_CHUNK as u64 {
@@ -412,7 +414,7 @@ impl<'t> Records<'t> {
 struct Chunk<'b> {
     /// The times of its first and last message.
     times: &'b [u8],
-    /// What it says that its records unpack to, bytes.
+    /// The unpacked size of its records that it states, bytes.
     size: u64,
     checksum: &'b [u8],
     compression: &'b [u8],

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::io::{self, Read, Write};
 
-/// `sensor_msgs/JointState` with what it is made of, as ROS 2 writes definitions into bags.
+/// `sensor_msgs/JointState` with the types that it consists of, as ROS 2 writes definitions into bags.
 const JOINT_STATE: &str = "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\n\
     float64[] effort\n\
     ================================================================================\n\
@@ -152,7 +152,7 @@ fn failed(error: McapError) -> io::Error {
     }
 }
 
-/// What lines of CSV became.
+/// The result of writing lines of CSV as MCAP.
 pub(crate) struct Written {
     pub(crate) rows: usize,
     /// The joints' names in the file.

@@ -1,5 +1,5 @@
 //! How much memory a log may take, and how many columns a table: the size that a file states is compared with
-//! both before room is made for it.
+//! both before the memory is allocated.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -35,7 +35,7 @@ fn container() -> Option<u64> {
     Some(bytes("memory.max")?.saturating_sub(bytes("memory.current")?))
 }
 
-/// What is left of the memory for one log.
+/// The remaining memory for one log.
 #[derive(Debug)]
 pub(crate) struct Memory {
     allowed: u64,
@@ -46,7 +46,7 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
-    /// That of a log which is read now.
+    /// The memory for a log that is read now.
     pub(crate) fn of_a_log() -> Memory {
         let said = Some(ALLOWED.load(Ordering::Relaxed)).filter(|bytes| *bytes > 0);
         let allowed = said.or_else(|| Some(free()? / 2)).unwrap_or(ELSEWHERE);
@@ -84,7 +84,8 @@ impl Memory {
     }
 }
 
-/// What takes its room piece by piece, and says at the end whether all of it was there.
+/// Claims of a reader that allocates piece by piece, and reports at the end whether the memory was
+/// sufficient.
 #[cfg(any(feature = "topics", feature = "npz", feature = "mat", feature = "hdf5"))]
 impl Memory {
     /// Takes a number of bytes of it; where they are not there, the log is refused.
@@ -114,7 +115,7 @@ impl Memory {
         self.refused.is_some()
     }
 
-    /// What is left, bytes.
+    /// The remaining memory, bytes.
     #[cfg(feature = "mat")]
     pub(crate) fn left(&self) -> u64 {
         self.allowed - self.claimed
@@ -143,7 +144,7 @@ pub(crate) fn few_columns(count: usize) -> Result<(), String> {
     }
 }
 
-/// Bytes as a person says them.
+/// A number of bytes in readable units.
 fn size(bytes: u64) -> String {
     let units = [(1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")];
     let bytes = bytes as f64;

@@ -44,7 +44,7 @@ struct Topic {
     reader: Reader,
     ros1: bool,
     table: Table,
-    /// How many messages there are, about; 0 where nobody says it.
+    /// The approximate number of messages; 0 if it is unknown.
     expected: usize,
 }
 
@@ -170,19 +170,19 @@ impl Topics {
         let _ = self.memory.claim_numbers(topic.table.numbers().saturating_sub(before));
     }
 
-    /// Room for the bytes of a chunk next to the tables.
+    /// Claims memory for the bytes of a chunk next to the tables.
     ///
     /// # Errors
-    /// Why there is none.
+    /// The reason why there is not enough.
     #[cfg(any(feature = "mcap", feature = "bag1"))]
     pub(super) fn holds(&self, bytes: u64) -> Result<(), String> {
         self.memory.holds(bytes)
     }
 
-    /// One table a topic.
+    /// The tables, one for each topic.
     ///
     /// # Errors
-    /// Where there was no room for one of them.
+    /// If there was not enough memory for one of them.
     pub(super) fn tables(self) -> std::io::Result<Vec<Table>> {
         self.memory.done()?;
         let filled = |Topic { mut table, .. }| {

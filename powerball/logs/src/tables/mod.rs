@@ -1,4 +1,4 @@
-//! What is in a file: tables of named columns, whatever the format, before anybody says what they mean.
+//! The content of a file: tables of named columns, whatever the format, before the columns get a meaning.
 
 #[cfg(any(feature = "npz", feature = "mat", feature = "hdf5"))]
 mod arrays;
@@ -43,11 +43,12 @@ mod schema;
 mod table;
 pub(crate) mod text;
 
-/// Said of a format that this build leaves out; the command has few, which keeps it quick to build.
+/// Message for a format that this build leaves out; the command has few formats, which keeps it quick to
+/// build.
 #[allow(dead_code, reason = "a build with every format does not use it")]
 pub(crate) const NOT_READ: &str =
     "this build does not read it: build with `--features formats`, which reads every format";
-/// As [`NOT_READ`], for a file that is to be written.
+/// Like [`NOT_READ`], for a file that is to be written.
 #[allow(dead_code, reason = "a build with every format does not use it")]
 pub(crate) const NOT_WRITTEN: &str =
     "this build does not write it: build with `--features formats`, or name a .csv";

@@ -1,4 +1,4 @@
-//! Columns of Arrow as numbers, whatever their type: not a number where a row has none.
+//! Columns of Arrow as numbers, whatever their type: NaN if a row has no value.
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{

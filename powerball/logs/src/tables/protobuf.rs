@@ -24,7 +24,7 @@ const STAMPS: [&str; 3] = ["stamp", "timestamp", "time"];
 pub(super) struct Schema(MessageDescriptor);
 
 impl Schema {
-    /// Finds a type in what it is made of; none where it is not there or holds no number with a point.
+    /// Finds a type in the set of definitions; `None` if it is not there or holds no floating-point number.
     pub(super) fn parse(kind: &str, set: &[u8]) -> Option<Schema> {
         let message = DescriptorPool::decode(set).ok()?.get_message_by_name(kind)?;
         has_quantities(&message, &mut HashSet::new()).then_some(Schema(message))
@@ -58,7 +58,7 @@ fn name_of(message: &MessageDescriptor) -> Option<FieldDescriptor> {
 /// A message while it is read.
 struct Walk<'r, 't> {
     row: &'r mut Row<'t>,
-    /// Of the value that is read.
+    /// Path of the value that is read.
     path: String,
     stamp: Option<f64>,
 }

@@ -1,5 +1,5 @@
-//! Logs at an address, `http://`, `https://` or `s3://`. Of an MCAP with an index only what is needed is fetched; what is
-//! stored otherwise is copied as a whole into the folder for temporary files.
+//! Logs at an address, `http://`, `https://` or `s3://`. Only the needed parts of an MCAP with an index are
+//! fetched; any other file is copied as a whole into the folder for temporary files.
 
 use super::contents::{Format, LogError};
 use super::mcap::Source;
@@ -23,17 +23,17 @@ const RETRIES: usize = 2;
 /// Copies are fetched in pieces of this many bytes.
 const PIECE: u64 = 16 << 20;
 
-/// A log that is not here.
+/// A log at an address.
 pub(super) enum Remote {
-    /// It is here.
+    /// The log is on this machine.
     No,
-    /// It was copied into a folder, which goes with this.
+    /// The log was copied into a folder, which is deleted with this value.
     Copied { _folder: tempfile::TempDir },
-    /// It is read where it is.
+    /// The log is read at its address.
     Read(Object),
 }
 
-/// What an address names.
+/// The object at an address.
 pub(super) struct Object {
     store: Box<dyn ObjectStore>,
     location: Location,
@@ -41,7 +41,7 @@ pub(super) struct Object {
     size: u64,
 }
 
-/// Reaches an address: the path of its copy, its format, and what it is.
+/// Opens an address: the path of its copy, its format, and the kind of access.
 pub(super) fn reached(address: &str) -> std::result::Result<(PathBuf, Format, Remote), LogError> {
     let failed = |e: String| LogError::of_file(address, "address", e);
     let runtime = Builder::new_current_thread().enable_all().build().map_err(|e| failed(e.to_string()))?;

@@ -1,6 +1,6 @@
 //! rosbag2 files of the storage `sqlite3` (`.db3`): the tables `topics` and `messages`.
 //!
-//! A bag whose program died has its last messages in a file next to it that ends in `-wal`, or half a
+//! A bag whose program crashed has its last messages in a file next to it that ends in `-wal`, or half a
 //! transaction to take back in one that ends in `-journal`. SQLite brings both in order by writing into them,
 //! so it is given copies; any other bag is opened for reading alone, without a lock. Either way nothing in
 //! the bag's folder is written or left behind.
@@ -29,7 +29,7 @@ fn opened(path: &Path) -> io::Result<Bag> {
     let waiting = ["-wal", "-journal"].map(|ending| with_ending(path, ending));
     let there = |file: &PathBuf| std::fs::metadata(file).is_ok_and(|m| m.len() > 0);
     if !waiting.iter().any(there) {
-        // A file that nobody writes needs no lock, and a folder that nobody may write none either.
+        // A file that no program writes needs no lock, and neither does a folder without write permission.
         let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI;
         let database = Connection::open_with_flags(uri(path)?, flags).map_err(failed)?;
         return Ok(Bag { database, _copy: None });

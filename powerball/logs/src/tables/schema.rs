@@ -1,8 +1,9 @@
 //! Definitions of ROS messages, as bags carry them, and the numbers of messages that they describe.
 //!
-//! A definition is the text of a `.msg` file and of all that it is made of, one after the other
-//! (<https://mcap.dev/spec/registry#ros2msg>; ROS 1 writes the same into its bags). A value's name is its path:
-//! `pose.position.x`; the values of an array are counted from 1, or named by a list of names next to them.
+//! A definition is the text of a `.msg` file and of all types that it uses, one after the other
+//! (<https://mcap.dev/spec/registry#ros2msg>; ROS 1 writes the same into its bags). A value's name is its
+//! path: `pose.position.x`; the values of an array are counted from 1, or named by a list of names next to
+//! them.
 
 use super::cdr::Cdr;
 use super::table::Row;
@@ -12,7 +13,7 @@ use std::collections::HashMap;
 pub(super) const MOST: usize = 64;
 /// Messages within messages.
 const DEEPEST: usize = 16;
-/// Parts of one message beyond this are none of joints.
+/// A message with more parts than these is not one of joints.
 const MOST_PARTS: usize = 1 << 20;
 /// Lists of texts that name the values of arrays.
 pub(super) const NAMES: [&str; 4] = ["name", "names", "joint_name", "joint_names"];
@@ -56,7 +57,7 @@ enum Count {
 }
 
 impl Schema {
-    /// Reads the definition of a type; none where it is not understood.
+    /// Reads the definition of a type; `None` if it is not understood.
     pub(super) fn parse(kind: &str, text: &str) -> Option<Schema> {
         // Name by name, in the order of the text; the first part has none of its own.
         let mut parts: Vec<(String, Vec<&str>)> = vec![(plain(kind), Vec::new())];
@@ -164,7 +165,7 @@ fn field(line: &str, package: &str, places: &HashMap<String, usize>) -> Option<O
 struct Walk<'a, 'r, 't> {
     schema: &'a Schema,
     row: &'r mut Row<'t>,
-    /// Of the value that is read.
+    /// Path of the value that is read.
     path: String,
     stamp: Option<f64>,
     /// Messages within it so far.

@@ -11,7 +11,7 @@ pub(crate) trait RowSink {
     /// Why rows of these columns are of no use.
     fn begin(&mut self, names: &[String]) -> Result<(), super::LogError>;
 
-    /// About `rows` rows follow: room is made for them at once, where there is enough.
+    /// Announces about `rows` rows: memory for them is allocated at once, if there is enough.
     fn expect(&mut self, rows: usize);
 
     /// How many numbers are kept of a row, its line among them.
@@ -21,8 +21,8 @@ pub(crate) trait RowSink {
     fn row(&mut self, line: usize, number: &dyn Fn(usize) -> Option<f64>);
 }
 
-/// Makes room for `more` further values at once, so that no second copy is ever needed; a file that claims
-/// more than there is gets none.
+/// Allocates memory for `more` further values at once, so that no second copy is needed; a file that claims
+/// more than the available memory gets none.
 pub(crate) fn make_room<T>(values: &mut Vec<T>, more: usize) {
     let _ = values.try_reserve_exact(more);
 }
@@ -34,7 +34,7 @@ pub struct Table {
     pub name: String,
     /// The type of its messages, or what its samples are called: "lines", "rows", "arrays".
     pub kind: String,
-    /// Where each sample stands, from 1: its line, or its number among the messages.
+    /// The position of each sample in the file, from 1: its line, or its number among the messages.
     pub line: Vec<usize>,
     /// The columns, in the order in which their names came up.
     pub columns: Vec<Column>,
