@@ -1,4 +1,4 @@
-//! A torque model that is there already, as identification and verification need it.
+//! An existing torque model, as identification and verification use it.
 
 use super::estimate::BaseModel;
 use super::mounting::Mounting;
@@ -12,7 +12,7 @@ pub trait KnownModel: fmt::Debug + Sync {
     /// The arm of the file as the model has it, for logs of this mounting.
     ///
     /// # Errors
-    /// Why the model says nothing of this arm or of this mounting, in words.
+    /// The reason why the model does not apply to this arm or to this mounting.
     fn arm(&self, arm: &Arm, mounting: Mounting) -> Result<Arm, String>;
 
     /// The model with its parameters and joints in the order of a body's.
@@ -28,7 +28,7 @@ pub trait KnownModel: fmt::Debug + Sync {
     fn residual(&self, body: &RigidArm, data: &Data<'_>) -> Signals;
 }
 
-/// What was identified goes beyond nothing: it can be judged on other logs as it is.
+/// An identified base model has no further terms: it can be judged on other logs without changes.
 impl KnownModel for BaseModel {
     fn arm(&self, arm: &Arm, _: Mounting) -> Result<Arm, String> {
         Ok(arm.clone())

@@ -1,4 +1,4 @@
-//! How a base stands: gravity in its frame, and which way is up.
+//! The mounting of a base: gravity in its frame, and the upward direction.
 
 use dyngen::Arm;
 use dyngen::exact::rational::{self, Rational, parse_rational};
@@ -9,17 +9,17 @@ use std::str::FromStr;
 /// How the base stands for a trajectory or for a log of one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Mounting {
-    /// As the arm file's gravity says.
+    /// The mounting that the gravity of the arm file gives.
     #[default]
     Filed,
-    /// Turned from there about its own x axis and then about the y axis of the room, degrees.
+    /// Turned from there about its own x axis and then about the fixed y axis, degrees.
     Turned {
         /// About x.
         roll: f64,
         /// About y.
         pitch: f64,
     },
-    /// As this gravity in the base frame says, m/s².
+    /// The mounting that this gravity in the base frame gives, m/s².
     Gravity([f64; 3]),
 }
 
@@ -45,7 +45,7 @@ impl Mounting {
         if gravity == Mounting::Filed.gravity(arm) { Mounting::Filed } else { Mounting::Gravity(gravity) }
     }
 
-    /// As it is written on the command line.
+    /// The mounting in the form of the command line.
     #[must_use]
     pub fn text(&self) -> String {
         match self {
@@ -76,12 +76,11 @@ impl Mounting {
     }
 }
 
-/// An arm, given as it is mounted for each of some paths, under gravity in a direction that no two of its
-/// mountings are special to: its minimal set is what the mountings determine together. The arm itself where
-/// there is one mounting alone.
+/// An arm, given as it is mounted for each of some paths, under gravity in a general direction: its minimal
+/// set is what the mountings determine together. The arm itself where there is one mounting alone.
 ///
 /// # Errors
-/// No mounting, or gravity that is no number.
+/// No mounting, or gravity that is NaN.
 pub fn together(arms: &[&Arm]) -> Result<Arm, String> {
     let mut arm = (*arms.first().ok_or("no mounting was given")?).clone();
     if let [_, _, ..] = arms {

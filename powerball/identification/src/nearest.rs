@@ -1,4 +1,4 @@
-//! Published values made those of a real arm.
+//! Corrects published values to those of a real arm.
 
 use super::estimate::{TorqueMetric, nearest};
 use dyngen::consistency;
@@ -38,9 +38,9 @@ pub struct NearestArm {
 pub struct ValueChange {
     /// The parameter.
     pub name: String,
-    /// As it was given.
+    /// The given value.
     pub given: f64,
-    /// As a real arm can have it.
+    /// The value that a real arm can have.
     pub consistent: f64,
 }
 
@@ -61,7 +61,7 @@ impl From<Error> for NearestError {
     }
 }
 
-/// Of all real arms the one whose torques come nearest to those of given values, over states within the arm's
+/// Finds the real arm whose torques come nearest to those of given values, over states within the arm's
 /// limits.
 ///
 /// # Errors

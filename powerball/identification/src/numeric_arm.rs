@@ -1,4 +1,4 @@
-//! An arm that is known only at run time as what control laws ask for.
+//! The dynamics that control laws need, for an arm that is known only at run time.
 
 use dyngen::{Error, Evaluator, Function, Model, Samples, SetKind};
 use nalgebra::{SMatrix, SVector};
@@ -12,18 +12,18 @@ pub struct NumericArm<const N: usize> {
     transposed: Evaluator,
     gravity: Evaluator,
     values: Vec<f64>,
-    /// What the encoders show too much, rad.
+    /// Offset of the encoders: shown minus true position, rad.
     offset: SVector<f64, N>,
     /// A body that it holds, as an arm of nothing else.
     held: Option<Box<NumericArm<N>>>,
 }
 
 impl<const N: usize> NumericArm<N> {
-    /// Of a derived arm, values of its minimal set, and what its encoders show too much (rad). `None` where it has another
-    /// number of joints, or there is not a value for each parameter.
+    /// Makes it from a derived arm, the values of its minimal set, and the offsets of its encoders (rad).
+    /// `None` if it has another number of joints, or not a value for each parameter.
     ///
     /// # Errors
-    /// As [`Model::function`].
+    /// The errors of [`Model::function`].
     pub fn new(model: &Model, values: &[f64], offset: [f64; N]) -> Result<Option<Self>, Error> {
         if model.arm().dof() != N || model.set(SetKind::Minimal)?.parameters.len() != values.len() {
             return Ok(None);

@@ -1,6 +1,7 @@
-//! What an identification takes: logs and summaries of logs, in memory or in files, each with its mounting.
+//! The input of an identification: logs and summaries of logs, in memory or in files, each with its mounting.
 //!
-//! Also here: logs as sufficient statistics, which [`identify`](super::identify) takes in their place.
+//! The module also reduces logs to sufficient statistics, which [`identify`](super::identify) takes in their
+//! place.
 
 use super::identify::{Gathering, IdentifyError};
 use super::mounting::Mounting;
@@ -21,9 +22,9 @@ use std::sync::Arc;
 /// other and dropped again, so that more logs can be fitted than fit into memory.
 #[derive(Clone, Debug)]
 pub struct Source<'a> {
-    /// What it is.
+    /// The log, the summary or the path of a file.
     pub input: Input<'a>,
-    /// How the base stood. Nothing said is as the arm file says, or as the summary itself does.
+    /// The mounting of the base. `None` means that of the arm file, or that of the summary itself.
     pub mounting: Option<Mounting>,
     /// How the columns of a file are read.
     pub map: Arc<ColumnMap>,
@@ -59,7 +60,7 @@ impl<'a> Source<'a> {
         Source { map, ..self }
     }
 
-    /// What messages call it: the file, or the log's own name.
+    /// Its name in messages: the file, or the log's own name.
     #[must_use]
     pub fn name(&self) -> String {
         match &self.input {
@@ -169,7 +170,7 @@ pub struct Summarized {
     pub bands: Bands,
     /// Why its logs should not be used, each a sentence without its full stop.
     pub unusable: Vec<String>,
-    /// What is to be reported about the logs and the arm file.
+    /// Warnings about the logs and the arm file.
     pub warnings: Vec<String>,
 }
 

@@ -1,18 +1,19 @@
-//! What makes a result one that should not be used: what a command prints first, and ends with 3 for.
+//! Conditions under which a result should not be used: a command prints them first and exits with code 3.
 //!
-//! What only makes a result less exact is a warning. docs/exit_codes.md lists all conditions with their sentences.
+//! A condition that only makes a result less exact is a warning. docs/exit_codes.md lists all conditions with
+//! their sentences.
 
 use super::conventions::Conventions;
 use dyngen::Arm;
 use powerball_controller::JointNumber;
 use powerball_logs::log::Log;
 
-/// What a result must satisfy.
+/// The data that the conditions of a usable result need.
 #[derive(Clone, Debug, Default)]
 pub struct Findings<'a> {
-    /// What the columns are.
+    /// The result of the check of the columns.
     pub columns: Option<&'a Conventions>,
-    /// What the logs and the arm file say themselves, where their columns were not asked.
+    /// Doubts from the logs and the arm file themselves, if the columns were not checked.
     pub doubts: Vec<String>,
     /// Joints that hardly move in the logs to fit.
     pub resting: Vec<JointNumber>,
@@ -70,7 +71,7 @@ impl Findings<'_> {
     }
 }
 
-/// What logs and an arm say themselves against being used, each once: a sentence without its full stop.
+/// Reasons in the logs and the arm themselves not to use them, each once: a sentence without its full stop.
 pub(crate) fn doubts<'l>(arm: &Arm, logs: impl IntoIterator<Item = &'l Log>) -> Vec<String> {
     let mut all = arm.doubts();
     for doubt in logs.into_iter().flat_map(|log| &log.doubts) {

@@ -1,4 +1,4 @@
-//! A model that is there already, judged on logs that it has not seen (Fig. 8).
+//! Verification of an existing model on logs that were not used to fit it (Fig. 8).
 
 use super::estimate::{JointVerdict, TorqueCurve, curves, verdicts};
 use super::identify::{IdentifyError, InMemory, by_band, one_mounting};
@@ -17,7 +17,7 @@ pub struct VerifyOptions<'a> {
     /// Largest error of a joint, as a share of the rms of its torque.
     pub tolerance: f64,
     /// The end of each joint's band, Hz, in which its error is taken: [`Identified::joint_bands`] of the
-    /// model. The widest where nothing, or none of [`BANDS`], is given.
+    /// model. The widest band is used if it is empty, or not one of [`BANDS`].
     ///
     /// [`Identified::joint_bands`]: super::Identified::joint_bands
     pub joint_bands: Vec<f64>,
@@ -45,7 +45,7 @@ pub struct Verified {
     pub arm: String,
     /// The model's error with an interval, joint by joint.
     pub joints: Vec<JointVerdict>,
-    /// As it was asked for.
+    /// The requested tolerance.
     pub tolerance: f64,
     /// Whether no joint's error may be beyond the tolerance.
     pub within_tolerance: bool,
@@ -56,7 +56,7 @@ pub struct Verified {
     /// Why it should not be used, each a sentence without its full stop; empty where it may be.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unusable: Vec<String>,
-    /// What is to be reported about the logs and the arm file.
+    /// Warnings about the logs and the arm file.
     pub warnings: Vec<String>,
     /// Measured torque and error, by joint.
     #[serde(skip)]

@@ -1,4 +1,4 @@
-//! What would explain that two fits differ, and all of it in a sentence.
+//! Causes that would explain the differences of two fits, and a sentence about them.
 
 use super::differences::{Differences, Inertia};
 use super::result::{Body, Cause};
@@ -13,7 +13,7 @@ use faer::Mat;
 /// the errors.
 const PAYLOAD_LEAVES: f64 = 0.05;
 
-/// What explains the differences, the inertial ones first; empty where there is none.
+/// The causes of the differences, the inertial ones first; empty if there are none.
 pub(super) fn causes(joints: usize, found: &Differences) -> Vec<Cause> {
     let mut causes = Vec::new();
     let inertial: Vec<String> =
@@ -56,7 +56,7 @@ struct Load {
     left: f64,
     /// Degrees of freedom of that.
     free: f64,
-    /// Of the normal equations of the body's parameters.
+    /// Solver of the normal equations of the body's parameters.
     solver: Solver,
 }
 

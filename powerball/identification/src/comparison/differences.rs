@@ -1,7 +1,7 @@
-//! Number by number: what differs, and how surely.
+//! Differences of two fits, number by number, with their certainty.
 //!
-//! Also here: a number of one fit against the same number of another one; what varies from run to run; one joint's
-//! friction curves side by side.
+//! The module also compares one number of two fits, estimates the variation from run to run, and compares the
+//! friction curves of one joint.
 
 use super::result::{
     CompareError, CompareOptions, ConstantDifference, FrictionDifference, ParameterDifference,
@@ -54,8 +54,8 @@ impl Inertia {
 }
 
 /// How often differences like these come by chance (Hotelling's T²), their covariance known with `freedom`
-/// degrees of freedom; 0 where they are too many to tell. The covariance is a sum over joints and octaves,
-/// each known with degrees of freedom of its own: those of a typical parameter stand for all.
+/// degrees of freedom; 0 if they are too many to decide. The covariance is a sum over joints and octaves,
+/// each known with degrees of freedom of its own: those of a typical parameter are used for all.
 fn hotelling(difference: &[f64], weights: &Solver, freedom: f64) -> f64 {
     let count = weights.kept().len() as f64;
     let left = freedom - count + 1.0;
@@ -256,7 +256,7 @@ fn curve_in_columns(a: &Side, b: &Side, joint: usize) -> Vec<f64> {
     let Some(rms) = a.velocity(joint) else { return vec![0.0; 5] };
     let f = &a.friction[joint];
     // Velocities are about normal. Points are even in ln q̇, as steep levels bend where it is slowest: each
-    // stands for a stretch of velocities that grows with its own.
+    // represents a range of velocities that grows with its own.
     let velocity = |k: usize| 3.0 * rms * (1e-4f64).powf(k as f64 / (POINTS - 1) as f64);
     let weight = |v: f64| (v / rms).sqrt() * (-0.25 * (v / rms).powi(2)).exp();
     let rows = Mat::from_fn(POINTS, 5, |k, c| {
@@ -288,7 +288,8 @@ pub(super) struct Difference {
 }
 
 impl Difference {
-    /// Of two independent values, each with its variance and degrees of freedom (Welch and Satterthwaite).
+    /// The difference of two independent values, each with its variance and degrees of freedom (Welch and
+    /// Satterthwaite).
     pub(super) fn of(a: (f64, f64, f64), b: (f64, f64, f64)) -> Difference {
         let variance = a.1 + b.1;
         let doubt = a.1 * a.1 / a.2 + b.1 * b.1 / b.2;
@@ -318,10 +319,10 @@ impl Difference {
 // What varies from run to run: no residual's spread has it, and two parts of one log tell it.
 
 impl Side {
-    /// This side with errors so large that fits of two parts of its logs, which are of one arm, differ by no
-    /// more than these: what varies from run to run and from path to path, and what the model lacks, is in no
-    /// residual's spread. One factor for all errors, the mean over joints and velocities of squared
-    /// differences of friction over their variance, 1 at least.
+    /// This side with enlarged errors, so that fits of two parts of its logs, which are of one arm, differ by
+    /// no more than these: the spread of a residual contains neither the variation from run to run and from
+    /// path to path, nor the error of the model. One factor for all errors, the mean over joints and
+    /// velocities of squared differences of friction over their variance, 1 at least.
     #[must_use]
     pub fn repeated(mut self, [first, second]: [&Side; 2]) -> Side {
         let factor =
@@ -339,10 +340,10 @@ impl Side {
 
 // One joint's friction curves side by side.
 //
-// Two questions are answered for a curve: is it off at any of a few velocities, and is viscous friction
-// another one? The second takes all velocities together (generalised least squares on a line through zero),
-// and sees what no single velocity tells: errors of the curves at several velocities are those of the same
-// few coefficients. Half of a joint's share of the level goes to each.
+// Two questions are answered for a curve: does it differ at any of a few velocities, and does its viscous
+// friction differ? The second takes all velocities together (generalised least squares on a line through
+// zero), and finds differences that no single velocity shows: errors of the curves at several velocities are
+// those of the same few coefficients. Half of a joint's share of the level goes to each.
 
 /// Friction is compared at these shares of the rms velocity: where it breaks loose, where it bends, and where
 /// the joint is as fast as it gets.
@@ -368,7 +369,7 @@ struct Point {
 }
 
 impl Curves {
-    /// Of every joint whose friction both know.
+    /// The curves of every joint whose friction is known in both fits.
     pub(super) fn of(a: &Side, b: &Side) -> Vec<Curves> {
         let known = |j: &usize| a.knows_friction(*j) && b.knows_friction(*j);
         (0..a.friction.len()).filter(known).map(|j| Curves::of_joint(a, b, j)).collect()
@@ -402,7 +403,7 @@ impl Curves {
         self.points.len()
     }
 
-    /// What differs: intervals miss with probability `p` each, and equal curves are called different with
+    /// The difference: intervals miss with probability `p` each, and equal curves are called different with
     /// probability `share`.
     pub(super) fn difference(&self, p: f64, share: f64) -> FrictionDifference {
         let of = |what: &dyn Fn(&Point) -> f64| self.points.iter().map(what).collect::<Vec<f64>>();
@@ -416,7 +417,7 @@ impl Curves {
         let on_the_line = self.steeper.map_or(1.0, Difference::p_value);
         let asked = if self.steeper.is_some() { 2.0 } else { 1.0 };
         let change = match (surest, self.steeper, self.points.last()) {
-            // Seen in the slope alone: what it makes of the friction where the joint is fastest.
+            // Seen in the slope alone: its part of the friction where the joint is fastest.
             (_, Some(steeper), Some(fast)) if asked * at_points >= share && asked * on_the_line < share => {
                 relative(steeper.interval(share / asked).map(|end| end * fast.velocity), fast.a)
             }

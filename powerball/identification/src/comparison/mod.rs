@@ -1,12 +1,12 @@
-//! Two fits side by side: which parameters and friction curves truly differ, what that means in torque, and a
-//! sentence.
+//! Two fits side by side: which parameters and friction curves truly differ, their difference in torque, and
+//! a sentence about the cause.
 //!
-//! Two fits never come to the same numbers. What differs is decided by the covariance of both: intervals that
-//! hold all at once at one stated level (Bonferroni's, over every parameter and every point of the friction
-//! curves that is compared), and by a few questions that share the level: inertia, each joint's friction, each
-//! constant torque. So equal arms are called different in that share of comparisons and not in that share of
-//! numbers. Friction is compared as a curve: its five coefficients make up for each other, the torque at a
-//! velocity does not.
+//! Two fits never give the same numbers. The covariance of both decides which differ: intervals that hold
+//! simultaneously at one stated level (Bonferroni's, over every parameter and every point of the friction
+//! curves that is compared), and by a few questions that share the level: inertia, each joint's friction,
+//! each constant torque. So equal arms are reported as different in that share of comparisons and not in that
+//! share of numbers. Friction is compared as a curve: its five coefficients make up for each other, the
+//! torque at a velocity does not.
 
 mod cause;
 mod differences;

@@ -1,4 +1,4 @@
-//! What a comparison is given and what it returns.
+//! Input and result of a comparison.
 
 use serde::Serialize;
 
@@ -37,23 +37,23 @@ pub struct Comparison {
     pub friction: Vec<FrictionDifference>,
     /// Constant torques, where both laws have them.
     pub constants: Vec<ConstantDifference>,
-    /// What all of it means in torque along the logs of `a`, joint by joint.
+    /// The differences in torque along the logs of `a`, joint by joint.
     pub torque_difference: Vec<TorqueDifference>,
-    /// What would explain it.
+    /// The causes that would explain the differences.
     pub causes: Vec<Cause>,
     /// All of it in words.
     pub sentence: String,
     /// Why it should not be used, each a sentence without its full stop; empty where it may be.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unusable: Vec<String>,
-    /// What is to be reported about the fits.
+    /// Warnings about the fits.
     pub warnings: Vec<String>,
 }
 
 /// One parameter of the minimal set.
 #[derive(Clone, Debug, Serialize)]
 pub struct ParameterDifference {
-    /// The parameter's name: the sum it stands for.
+    /// The parameter's name: its sum of parameters.
     pub name: String,
     /// The value in `a`, SI units.
     pub a: f64,
@@ -61,7 +61,7 @@ pub struct ParameterDifference {
     pub b: f64,
     /// b − a.
     pub difference: f64,
-    /// Where the difference lies.
+    /// Interval of the difference.
     pub interval: [f64; 2],
     /// How often equal arms would differ so in this parameter.
     pub p_value: f64,
@@ -82,10 +82,10 @@ pub struct FrictionDifference {
     pub b: Vec<f64>,
     /// b − a.
     pub difference: Vec<f64>,
-    /// Where the differences lie.
+    /// Intervals of the differences.
     pub interval: Vec<[f64; 2]>,
-    /// Where (b − a)/a lies: of two logs of one path the mean along it, else at the velocity at which the difference is
-    /// surest, at the fastest one where only the slope tells a difference.
+    /// Interval of (b − a)/a: for two logs of one path its mean along it, else at the velocity at which the
+    /// difference is most certain, or at the fastest one if only the slope shows a difference.
     pub change: [f64; 2],
     /// How often equal arms would differ so in the curve.
     pub p_value: f64,
@@ -104,7 +104,7 @@ pub struct ConstantDifference {
     pub b: f64,
     /// b − a.
     pub difference: f64,
-    /// Where the difference lies.
+    /// Interval of the difference.
     pub interval: [f64; 2],
     /// How often equal arms would differ so in it.
     pub p_value: f64,
@@ -112,14 +112,14 @@ pub struct ConstantDifference {
     pub differs: bool,
 }
 
-/// What the difference of two models is in the torque of one joint, along the logs of `a`.
+/// The difference of two models in the torque of one joint, along the logs of `a`.
 #[derive(Clone, Debug, Serialize)]
 pub struct TorqueDifference {
     /// Joint, from 1.
     pub joint: usize,
     /// rms of the difference, N·m or N.
     pub rms: f64,
-    /// What the errors of both fits alone would make of it.
+    /// Expected value of the difference from the errors of both fits alone.
     pub expected: f64,
     /// rms of the difference over the rms of the measured torque.
     pub relative: f64,
@@ -205,10 +205,10 @@ pub enum CompareError {
     /// A file cannot be read or is no fit.
     #[error("{0}")]
     Unreadable(String),
-    /// They are of different arms or parameter sets.
+    /// The fits are of different arms or parameter sets.
     #[error("{0}")]
     Different(String),
-    /// Nothing of them has standard errors.
+    /// The fits have no standard errors in common.
     #[error("{0}")]
     NoErrors(String),
     /// A setting out of its range.

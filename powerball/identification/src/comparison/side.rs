@@ -14,7 +14,7 @@ use std::path::Path;
 /// A fit that is compared with another one.
 #[derive(Clone, Debug)]
 pub struct Side {
-    /// What messages call it.
+    /// Its name in messages.
     pub name: String,
     /// The arm's name.
     pub arm: String,
@@ -58,8 +58,8 @@ impl Side {
         }
     }
 
-    /// This side with the log that was fitted, so that friction can be compared along it where the other one
-    /// runs its path.
+    /// This side with the log that was fitted, so that friction can be compared along it if the other side
+    /// runs the same path.
     #[must_use]
     pub fn along(mut self, log: &Log) -> Side {
         self.strokes = strokes(log);
@@ -148,7 +148,7 @@ impl Side {
                 (value, variance, freedom)
             }
             None => {
-                // Nobody knows how the errors hang together: as badly as they can.
+                // The correlation of the errors is unknown: the worst case is taken.
                 let [g1, g2, g3, g4, g5] = self.friction[joint].std.map(|std| std.unwrap_or(0.0));
                 let relative = |std: f64, gamma: f64| if gamma > 0.0 { std / gamma } else { 0.0 };
                 let row = friction_row(self.shape(joint), velocity);

@@ -15,7 +15,7 @@ use powerball_logs::vector::median;
 /// A joint's way from one reversal to the next.
 #[derive(Clone, Copy, Debug)]
 pub struct Stroke {
-    /// Where it is as fast as it mostly is, from and to, rad or m.
+    /// The part of the stroke at its usual velocity, from and to, rad or m.
     pub ends: [f64; 2],
     /// Median velocity, rad/s or m/s.
     pub velocity: f64,
@@ -158,7 +158,7 @@ impl Change {
         f_tail(t * t, 1.0, self.freedom)
     }
 
-    /// Where the difference lies, as a share of friction, but for probability `p`.
+    /// Interval of the difference as a share of friction, which misses with probability `p`.
     pub(super) fn interval(&self, p: f64) -> [f64; 2] {
         let half = t_critical(p, self.freedom) * self.std;
         [self.difference - half, self.difference + half].map(|end| end / self.friction)

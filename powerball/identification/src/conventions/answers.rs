@@ -1,4 +1,4 @@
-//! What was found, in words.
+//! The answers in words.
 
 use super::arm_file::{Better, Change};
 use super::properties::{Common, Scale, Size, Unit};
@@ -52,7 +52,7 @@ fn of_step(step: &Step, unit: &Unit) -> Answer {
     }
 }
 
-/// The question that a change answers, and what it says; `rival` is whether another change fits as well.
+/// The question that a change answers, and the answer; `rival` is whether another change fits as well.
 fn in_words(change: &Change, rival: bool, unit: &Unit, why: &str) -> (&'static str, String) {
     let or =
         |what: &str| if rival { format!(", or {what}: these logs do not show which") } else { String::new() };
@@ -189,7 +189,7 @@ pub(super) fn plain(question: &'static str, as_said: Option<bool>, sentence: Str
     Answer { question, as_said, as_it_is: Vec::new(), as_it_would_be: Vec::new(), sentence }
 }
 
-/// What is known in addition to the steps.
+/// Facts that are known in addition to the steps.
 pub(super) struct Facts<'a> {
     pub(super) sign: Common,
     pub(super) unit: &'a Unit,
@@ -202,7 +202,7 @@ pub(super) struct Facts<'a> {
     pub(super) delay_would_show: bool,
     /// Whether the fit is good enough to judge by.
     pub(super) good: bool,
-    /// What in the arm file no arm is.
+    /// Values of the arm file that are impossible for an arm.
     pub(super) doubts: &'a [String],
     /// Whether a transmission couples joints.
     pub(super) coupled: bool,

@@ -1,12 +1,12 @@
-//! Whether the arm file is this arm's: the other convention, a sign of its table, a zero a quarter turn off, gravity
-//! from another side.
+//! Whether the arm file belongs to this arm: the other convention, a sign of its table, a zero a quarter turn
+//! off, gravity from another side.
 //!
 //! Each answer is an arm with one thing changed, judged like a reading of the columns: one rigid arm and textbook
 //! friction, fitted to one part of the logs and judged by the other. Its columns are numeric Newton–Euler: to derive
 //! every such arm would take half a minute. The arm that is reported is derived then, and its columns are
 //! evaluated like those of any other arm.
 //!
-//! Also here: one property of a log's columns that may differ from what is declared.
+//! [`Change`] is one property of a log's columns that may differ from the declared one.
 
 use super::asked::{Asked, Positions, Torques};
 use super::fit::{Gravity, Judged, Rows, judge};
@@ -38,7 +38,7 @@ pub(super) struct ArmChange {
     pub(super) arm: Arm,
     /// The changed line, and where it stands.
     pub(super) line: String,
-    /// What it is as it stands.
+    /// The present value of this line.
     pub(super) now: String,
 }
 
@@ -56,7 +56,8 @@ pub(super) struct Better {
 pub(super) fn better(asked: &Asked<'_>, found: &Found<'_>) -> Option<Better> {
     let arm = asked.body.arm();
     let worst = shares(&found.judged).into_iter().filter(|share| share.is_finite()).fold(0.0, f64::max);
-    // Numeric columns are those of joints, and a part of the torques that has no weight says nothing of gravity.
+    // Numeric columns are those of joints, and a part of the torques without weight carries no information
+    // about gravity.
     if worst < NOTICED
         || asked.body.motors().is_some()
         || found.read.gravity == Gravity::TakenOut && found.steps.len() > 1
@@ -278,7 +279,7 @@ pub(super) enum Change {
     Factors(Vec<f64>),
     /// All torque columns are late, s.
     Late(f64),
-    /// The torques hold nothing of gravity, which would act on these joints.
+    /// The torques do not contain gravity, which would act on these joints.
     GravityOut(Vec<usize>),
     /// The position column of a joint has the other sign.
     PositionReversed(usize),
@@ -308,7 +309,7 @@ impl Reading {
         Reading { torques: Torques::plain(dof), positions: Positions::plain(dof), gravity: Gravity::Included }
     }
 
-    /// This reading with a change.
+    /// This reading with one change.
     pub(super) fn with(&self, change: &Change) -> Reading {
         let mut read = self.clone();
         match change {

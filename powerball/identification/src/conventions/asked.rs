@@ -1,6 +1,6 @@
-//! The logs that are asked, and the rows of any reading of their positions.
+//! The logs whose columns are checked, and the rows of any reading of their positions.
 //!
-//! Also here: logs made small; a way to read the columns of a log; a factor by joint.
+//! The module also reduces logs, and defines a reading of the columns of a log and a factor by joint.
 
 use super::arm_file::FACTOR;
 use super::fit::{Gravity, Rows, factors_of_body};
@@ -66,7 +66,7 @@ impl Thinned {
     }
 }
 
-/// What is asked.
+/// The logs whose columns are checked.
 #[derive(Debug)]
 pub(super) struct Asked<'a> {
     pub(super) body: &'a RigidArm,
@@ -97,7 +97,7 @@ impl<'a> Asked<'a> {
         self.few.rows(self.body, read, gravity)
     }
 
-    /// As many seconds as [`Asked::rows`] at a lower rate, for comparing arms.
+    /// Rows over as many seconds as [`Asked::rows`] at a lower rate, for comparing arms.
     ///
     /// # Errors
     /// Where too little remains.
@@ -183,7 +183,7 @@ fn of_stretch(log: &Log, piece: Range<usize>, wanted: f64) -> Option<Log> {
 
 // A way to read the columns of a log.
 
-/// What the position columns are taken to be: joint k's position is `sign[k]`·`scale` times column
+/// A reading of the position columns: joint k's position is `sign[k]`·`scale` times column
 /// `column[k]`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Positions {
@@ -202,7 +202,7 @@ impl Positions {
         *self == Positions::plain(self.column.len())
     }
 
-    /// What a joint's column is multiplied by.
+    /// The factor of a joint's column.
     pub(super) fn factor(&self, arm: &Arm, joint: usize) -> f64 {
         let turns = arm.joints[joint].kind == JointKind::Revolute;
         self.sign[joint] * if turns { self.scale } else { 1.0 }
@@ -224,12 +224,12 @@ impl Positions {
     }
 }
 
-/// What the torque columns are taken to be: joint k's torque at time t is `gain[k]` times column `column[k]`
+/// A reading of the torque columns: joint k's torque at time t is `gain[k]` times column `column[k]`
 /// at t + `late[k]`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Torques {
     pub(super) column: Vec<usize>,
-    /// With its sign.
+    /// Factor with its sign.
     pub(super) gain: Vec<f64>,
     /// How late the column is, s.
     pub(super) late: Vec<f64>,
@@ -273,7 +273,7 @@ impl Torques {
 // The rigid arm is shared by all joints, so a factor on one of them shows. A common factor does not: the
 // median joint keeps its own. A joint that shares nothing with others keeps its own too.
 
-/// The factors of all joints that fit a part best, relative to those of `read`, where some are not one.
+/// The factors of all joints that fit a part best, relative to those of `read`, if some are not one.
 pub(super) fn factors(rows: &Rows<'_>, read: &Torques, part: usize, ridge: f64) -> Option<Vec<f64>> {
     relative(factors_of_body(rows, read, part, ridge).iter().map(|kappa| 1.0 / kappa).collect())
 }

@@ -1,8 +1,8 @@
-//! A reading judged: the shared rigid arm and textbook friction, fitted to one part of the logs and judged by
-//! the other, both ways round.
+//! The judgement of a reading: the shared rigid arm and textbook friction, fitted to one part of the logs and
+//! judged by the other, both ways round.
 //!
-//! Also here: the rows of a regression for one reading of the positions; every reading of the torques is judged on
-//! them.
+//! The module also makes the rows of a regression for one reading of the positions; every reading of the
+//! torques is judged on them.
 
 use super::asked::Torques;
 use crate::estimate::{NormalEquations, Solver};
@@ -45,7 +45,7 @@ pub(super) struct PartFit {
     pub(super) solver: Solver,
 }
 
-/// What a reading leaves.
+/// The residuals of a reading.
 #[derive(Clone, Debug)]
 pub(super) struct Judged {
     /// By part that is judged and joint: mean square of what is left over that of the torque; NaN for a joint
@@ -138,7 +138,7 @@ pub(super) fn factors_of_body(rows: &Rows<'_>, read: &Torques, part: usize, ridg
                 (&rows.places[joint], &sums[joint][part].normal);
             let (weight, to_body) = (1.0 / variance[joint], places.len() - FRICTION);
             let of = |i: usize| if i < to_body { kappa[joint] } else { 1.0 };
-            // The torque of the body as it is so far is the column of the factor.
+            // The torque of the body fitted so far is the column of the factor.
             let column = |i: usize| (0..to_body).map(|k| own[(k, i)] * theta[places[k]]).sum::<f64>();
             let mut square = 0.0;
             for (i, at) in places.iter().enumerate() {
@@ -210,7 +210,7 @@ const FEWEST: usize = 20;
 /// The longest shift that can be asked for, s: rows keep this distance from the ends of a recording.
 pub(super) const LONGEST: f64 = 0.2;
 
-/// What the torques are held to contain of gravity.
+/// The assumption about gravity in the torques.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Gravity {
     Included,
@@ -263,7 +263,7 @@ impl<'a> Rows<'a> {
         Ok(Rows::of(data, part))
     }
 
-    /// These rows with the columns of another arm: `count` parameters, and what they are along a recording,
+    /// These rows with the columns of another arm: `count` parameters, and their columns along a recording,
     /// samples × n × parameters.
     pub(super) fn of_columns(&self, count: usize, columns: impl Fn(&Recording) -> Vec<f64>) -> Rows<'a> {
         Rows::of(self.data.of_other_columns(count, columns), &self.part)
@@ -296,7 +296,7 @@ impl<'a> Rows<'a> {
         self.inertial() + FRICTION * self.dof()
     }
 
-    /// Of all coefficients those of a joint's columns.
+    /// Selects the coefficients of a joint's columns.
     fn of_joint(&self, joint: usize, theta: &[f64]) -> Vec<f64> {
         self.places[joint].iter().map(|place| theta[*place]).collect()
     }
@@ -306,7 +306,7 @@ impl<'a> Rows<'a> {
         self.joints[joint].iter().all(|part| part.at.len() >= FEWEST)
     }
 
-    /// The torque of a joint in a part, as it is read.
+    /// The torque of a joint in a part, by this reading.
     pub(super) fn torque(&self, read: &Torques, joint: usize, part: usize) -> Vec<f64> {
         let (column, gain) = (read.column[joint], read.gain[joint]);
         let shift = (read.late[joint] * self.data.rate()).clamp(-1e4, 1e4);

@@ -1,11 +1,11 @@
-//! What the columns of a log are: signs, units, order, side of the gear, gravity, delay. Reported, never
-//! modified.
+//! The meaning of the columns of a log: signs, units, order, side of the gear, gravity, delay. It is
+//! reported; nothing is modified.
 //!
 //! Every answer is judged against its alternatives: by the held-out error of one rigid arm with textbook
 //! friction, fitted to one part of the logs and judged by the other, both ways round; and by what cannot be
-//! negative, the energy of motion and the power that friction takes. Only what lowers squared errors to half
-//! both ways round, or has a physical sign that is sure in both parts, is reported as different from what is
-//! declared.
+//! negative, the energy of motion and the power that friction takes. An alternative is reported as different
+//! from what is declared only if it halves the squared errors both ways round, or has a physical sign that is
+//! certain in both parts.
 //!
 //! | | |
 //! |---|---|
@@ -33,10 +33,10 @@ use properties::{Common, Size, Unit};
 pub use result::{Answer, Conventions, GravityIs, Kind, PerJoint, PositionColumns, Side, TorqueColumns};
 use search::{Found, gravity_is, search};
 
-/// What the columns of some logs of an arm are. `validate` are logs of another path, if there are any; without
-/// them the halves of each log judge each other.
+/// Checks the meaning of the columns of some logs of an arm. `validate` are logs of another path, if there
+/// are any; without them the halves of each log judge each other.
 ///
-/// Nothing is changed by it, and nothing fails: where the logs hold too little, that is reported.
+/// The check changes nothing and does not fail: if the logs hold too little, this is reported.
 #[must_use]
 pub fn conventions(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Conventions {
     let mut result = asked_of_arm(body, logs, validate);

@@ -1,7 +1,7 @@
-//! What cannot be negative: the energy of motion, and the power that friction takes.
+//! Quantities that cannot be negative: the energy of motion, and the power that friction takes.
 //!
-//! Both are linear in the coefficients of a fit, so each comes with a standard error. A reading of the torques
-//! with the wrong sign fits as well as the right one; these two tell them apart.
+//! Both are linear in the coefficients of a fit, so each comes with a standard error. A reading of the
+//! torques with the wrong sign fits as well as the right one; these two distinguish them.
 
 use super::fit::{FRICTION, PartFit, Rows};
 
@@ -24,7 +24,7 @@ impl Estimate {
     }
 }
 
-/// What multiplies the coefficients of a fit to a part.
+/// The factors of the coefficients of a fit to a part.
 #[derive(Debug)]
 pub(super) struct Energies {
     /// The mean energy of motion of the whole arm, J.

@@ -1,5 +1,5 @@
-//! What the torque columns are, one question each: their unit, sign, side of the gear, whether they were measured, hold
-//! gravity, are late.
+//! Properties of the torque columns, one question each: their unit, their sign, the side of the gear, whether
+//! they were measured, whether they contain gravity, and whether they are late.
 
 use super::arm_file::FACTOR;
 use super::asked::{Torques, median};
@@ -31,7 +31,7 @@ const WEIGHTLESS: f64 = 0.15;
 /// Factors agree with numbers of the arm file within this.
 const AGREE: f64 = 1.2;
 
-/// What the size of the torques says.
+/// The result from the size of the torques.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Scale {
     Plausible,
@@ -91,7 +91,7 @@ impl Size {
         matches!((self.weight, self.inertia), (Some(weight), Some(inertia)) if weight < WEIGHTLESS * inertia)
     }
 
-    /// What the size of the torques says, with what is known of gravity in them.
+    /// The result from the size of the torques, with the answer about gravity in them.
     pub(super) fn scale(&self, gravity: Option<GravityIs>) -> Scale {
         let (Some(inertia), weight) = (self.inertia, self.weight) else { return Scale::Unknown };
         let heavy = match weight.filter(|_| !self.is_weightless()) {
@@ -145,8 +145,8 @@ pub(super) fn unit(found: &Found<'_>, scale: Scale) -> Unit {
         if agree(&constants) {
             return Unit::Ampere(constants);
         }
-        // Most columns of one unit, and a few that are surely not of it; anything between is reported as it
-        // is.
+        // Most columns of one unit, and a few that are surely not of it; anything in between is reported
+        // without a correction.
         let odd = gains.iter().filter(|g| g.ln().abs() > FACTOR.ln()).count();
         let usual = gains.iter().filter(|g| g.ln().abs() < AGREE.ln()).count();
         let few = 3 * odd <= gains.len() && odd + usual == gains.len() && scale != Scale::TooSmall;
@@ -188,7 +188,7 @@ pub(super) fn driven_by_friction(rows: &Rows<'_>, read: &Torques, energies: &[En
     if driven.len() > braked.len() { braked } else { driven }
 }
 
-/// What is known of the sign that all torques have in common.
+/// The result about the sign that all torques have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Common {
     AsSaid,
@@ -259,7 +259,7 @@ const NOISE: f64 = 2e-3;
 /// … where less than this share of its variance follows the positions.
 const FOLLOWS: f64 = 0.3;
 
-/// What two logs, or the noise, show.
+/// Whether torques were measured or commanded, from two logs or from the noise.
 pub(super) fn kind(logs: &[&Log]) -> Option<Kind> {
     for (k, a) in logs.iter().enumerate() {
         if logs[..k].iter().any(|b| repeats(a, b)) {
@@ -312,8 +312,7 @@ const SAMPLES: usize = 500;
 /// Gravity acts on a joint where it is more than this share of its torque.
 const ACTS: f64 = 0.2;
 
-/// The rms torque of gravity by joint that a fit's inertial parameters stand for, N·m, and the largest of any
-/// joint.
+/// The rms torque of gravity by joint from a fit's inertial parameters, N·m, and the largest of any joint.
 pub(super) fn weight(rows: &Rows<'_>, theta: &[f64]) -> (Vec<f64>, f64) {
     let (n, body) = (rows.dof(), rows.data.body);
     let all: usize = rows.data.recordings.iter().map(|r| r.len()).sum();

@@ -1,6 +1,6 @@
-//! What is reported about a log's columns: the `conventions` of identified.json and explained.json.
+//! The report on a log's columns: the `conventions` of identified.json and explained.json.
 //!
-//! Also here: the column map that would set columns right.
+//! The module also makes the column map that would correct the columns.
 
 use super::arm_file::Reading;
 use super::properties::{Common, Unit};
@@ -10,7 +10,7 @@ use serde::Serialize;
 /// Of a joint's torque more than this share is much.
 const MUCH: f64 = 0.5;
 
-/// What the torque and position columns of some logs are. Nothing was changed by it.
+/// The meaning of the torque and position columns of some logs. Nothing was modified.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Conventions {
     /// The torque columns.
@@ -19,8 +19,8 @@ pub struct Conventions {
     pub positions: PositionColumns,
     /// Why, in words.
     pub evidence: String,
-    /// The column map that would set the columns right, TOML for `--map`; `None` where they are as they
-    /// should be, or where it is not known how to.
+    /// The column map that would correct the columns, TOML for `--map`; `None` if they are correct, or if the
+    /// correction is unknown.
     #[serde(rename = "mend")]
     pub suggested_map: Option<String>,
     /// The line of the arm file that would set it right; `None` where nothing speaks clearly against the file.
@@ -30,11 +30,11 @@ pub struct Conventions {
     /// does not move. Not part of the JSON: see each answer.
     #[serde(skip)]
     pub left: Vec<f64>,
-    /// What was asked, one after another.
+    /// The answers to all questions, in order.
     pub answers: Vec<Answer>,
 }
 
-/// What torque columns are. `None` is: these logs do not tell.
+/// Properties of the torque columns. `None` means that these logs cannot determine it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TorqueColumns {
     /// 1 where torques are positive in the direction of q, −1 where they are reversed; by joint where the
@@ -58,7 +58,7 @@ pub struct TorqueColumns {
     pub factor: Option<Vec<f64>>,
 }
 
-/// What position columns are. `None` is: these logs do not tell.
+/// Properties of the position columns. `None` means that these logs cannot determine it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PositionColumns {
     /// By joint: 1, or −1 where the column counts against the arm file's axis.
@@ -90,7 +90,7 @@ pub enum Side {
     Motor,
 }
 
-/// Whether torques hold what gravity asks for.
+/// Whether torques contain gravity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum GravityIs {
     /// They do.
@@ -114,7 +114,7 @@ pub enum Kind {
 /// One answer.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Answer {
-    /// What was asked.
+    /// The question.
     pub question: &'static str,
     /// Whether the columns are as they should be; `None` where these logs do not tell.
     pub as_said: Option<bool>,
@@ -164,7 +164,7 @@ impl Conventions {
         (!list.is_empty()).then(|| format!("one rigid arm with textbook friction leaves {}", list.join(", ")))
     }
 
-    /// What is surely wrong with the columns or the arm file, a sentence each; empty where nothing is.
+    /// Certain errors of the columns or the arm file, a sentence each; empty if there are none.
     #[must_use]
     pub fn wrong(&self) -> String {
         let wrong = self.answers.iter().filter(|answer| answer.as_said == Some(false));
@@ -226,7 +226,7 @@ fn short(x: f64) -> f64 {
     format!("{x:.3e}").parse().unwrap_or(x)
 }
 
-/// TOML for `--map`; `None` where nothing is to be changed, or where it is not known by how much.
+/// The correcting map as TOML for `--map`; `None` if nothing must be changed, or if the amount is unknown.
 pub(super) fn suggested_map(read: &Reading, sign: Common, unit: &Unit) -> Option<String> {
     let n = read.torques.column.len();
     let scales: Vec<f64> = match unit {

@@ -18,7 +18,7 @@ const CLEAR: f64 = 0.5;
 const HELPS: f64 = 1.2;
 /// It does nothing where they grow to less than this.
 const NO_WORSE: f64 = 1.05;
-/// What it may do to the joints that it does not concern.
+/// Largest factor by which a change may raise the error of the joints that it does not concern.
 const WORSE: f64 = 1.5;
 /// A joint with an error below this share of its torque fits.
 const FITS: f64 = 0.1;
@@ -43,7 +43,7 @@ pub(super) struct Step {
     pub(super) after: Vec<f64>,
 }
 
-/// What was found.
+/// The result of the search.
 #[derive(Debug)]
 pub(super) struct Found<'a> {
     pub(super) rows: Rows<'a>,

@@ -1,12 +1,13 @@
-//! The bands in which logs speak of a model, joint by joint.
+//! The bands in which logs determine a model, joint by joint.
 //!
 //! Logs are reduced in bands an octave apart ([`Bands`]). In the spectrum of a joint's torque the model's
-//! part sinks under what it leaves at some frequency; from there on rows show noise, or what no rigid arm
-//! does. Each log says by itself where that is, with a fit of its own; the powers are added over logs, so
-//! that summaries say it too. A joint of whose torque much is left, and whose model is below what it leaves in an
-//! octave, is fitted, and judged, in the band below that octave: in a wider one it would be judged on the noise of
-//! positions that were differentiated twice, and whatever attenuates the model would help. Rows of a joint are
-//! filtered by themselves, so the other joints keep theirs. Identification and explanation take the same bands.
+//! part falls below the residual at some frequency; above it, rows show noise, or motion that no rigid arm
+//! has. Each log gives this frequency by its own fit; the powers are added over logs, so that summaries give
+//! it too. A joint with a large residual, whose model is below its residual in an octave, is fitted and
+//! judged in the band below that octave: in a wider one it would be judged on the noise of positions that
+//! were differentiated twice, and any attenuation of the model would lower the error. Rows of a joint are
+//! filtered by themselves, so the other joints keep theirs. Identification and explanation take the same
+//! bands.
 
 use super::design::Design;
 use super::estimates::stats_of;
@@ -47,7 +48,7 @@ const MUCH: f64 = 0.1;
 
 /// Which of [`BANDS`] each joint has: `left` is the share of its torque that a fit of the widest leaves.
 fn joint_bands(left: &[f64], spectrum: &[Powers]) -> Vec<usize> {
-    // How many octaves below the widest band hold less of a model than of what it leaves.
+    // Number of octaves below the widest band in which the model is smaller than its residual.
     let quiet = |octaves: &Powers| octaves.iter().take_while(|[model, left]| model < left).count();
     left.iter().zip(spectrum).map(|(left, octaves)| if *left > MUCH { quiet(octaves) } else { 0 }).collect()
 }
@@ -75,8 +76,8 @@ pub fn bands_of_logs(body: &RigidArm, logs: &[Log], options: &DataOptions, left:
     joint_bands(left, &all.spectrum)
 }
 
-/// Reduces one log in all bands, and takes the spectrum of its first part. Also gives what was left out of
-/// it, in words.
+/// Reduces one log in all bands, and takes the spectrum of its first part. Also gives notes on the samples
+/// that were left out.
 ///
 /// # Errors
 /// [`DataError`] where nothing of the log can be used.
@@ -100,7 +101,7 @@ fn spectrum_of(body: &RigidArm, log: &Log, widest: &DataOptions, own: &Solution)
     first.map_or_else(|| vec![Powers::default(); body.dof()], |data| spectrum(&data, &own.shapes, &own.theta))
 }
 
-/// By joint and octave between neighbouring bands: the power of the model's torque, and of what it leaves.
+/// By joint and octave between neighbouring bands: the power of the model's torque, and of its residual.
 fn spectrum(data: &Data<'_>, shapes: &[[f64; 2]], theta: &[f64]) -> Vec<Powers> {
     let design = Design::new(data, &friction_columns(data, shapes), &[]);
     let rate = data.rate() / data.band.decimation as f64;

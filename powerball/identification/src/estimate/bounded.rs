@@ -108,8 +108,8 @@ impl<W: Fn(usize) -> bool> Problem<'_, W> {
             .find(|next| next.error.sum < now.error.sum - 1e-14 * (now.error.size + next.error.size))
     }
 
-    /// The point after one coefficient is let free: straight towards the best solution; what meets its bound on the way
-    /// is held there, and the way goes on with what is left.
+    /// The point after one coefficient is set free: straight towards the best solution; a coefficient that
+    /// meets its bound on the way is held there, and the others continue.
     fn freed(&self, now: &Point, freed: usize) -> Point {
         let mut held: Vec<usize> = now.held.iter().copied().filter(|k| *k != freed).collect();
         let mut x = now.x.clone();

@@ -9,13 +9,13 @@
 //!
 //! minimise ½·(Kπ − θ)ᵀ·G·(Kπ − θ) + μ·Σ (tr(P₀⁻¹·P) − ln det P) + μ·Σ (Iₘ/Iₘ₀ − ln Iₘ),
 //!
-//! solved by Newton's method for a falling μ. The barrier keeps P definite and, through its trace, draws what
-//! the values leave open towards an ordinary body P₀ (entropic regularisation, Lee, Wensing and Park 2019).
-//! The certificate is the barrier's: the value found exceeds the least possible one by at most μ times the
-//! number of barrier dimensions.
+//! solved by Newton's method for a falling μ. The barrier keeps P definite and, through its trace, draws
+//! parameters that the values do not determine towards an ordinary body P₀ (entropic regularisation, Lee,
+//! Wensing and Park 2019). The certificate is the barrier's: the value found exceeds the least possible one
+//! by at most μ times the number of barrier dimensions.
 //!
-//! Also here: a fit whose parameters a real arm can have, and what that costs; how far apart values of a parameter set
-//! are, in torque.
+//! The module also makes a fit whose parameters a real arm can have, with the rise of its error, and the
+//! metric between values of a parameter set, in torque.
 
 use super::bounded::bounded;
 use super::estimates::{ResidualStats, stats_of};
@@ -126,7 +126,7 @@ pub fn nearest(model: &Model, kind: SetKind, values: &[f64], metric: &Mat<f64>) 
         if let Some(k) = column(&Parameter { link, kind: ParameterKind::Im }) {
             let ratio = arm.joints[link].rotor_ratio.as_ref().map_or(1.0, dyngen::exact::rational::to_f64);
             let ordinary = ROTOR / (ratio * ratio);
-            // The ordinary body at the link before has room for so much.
+            // The ordinary body at the link before can hold this much.
             x[k] = ordinary.min(0.1 * MASS * RADIUS * RADIUS);
             problem.rotors.push((k, ordinary));
         }
@@ -296,7 +296,7 @@ pub struct ConsistentFit {
     pub theta: Vec<f64>,
 }
 
-/// The consistent fit as it is reported.
+/// The report on the consistent fit.
 #[derive(Clone, Debug, Serialize)]
 pub struct ConsistentReport {
     /// Every parameter of the arm: a body for each link.
@@ -419,7 +419,7 @@ impl TorqueMetric {
         Ok(TorqueMetric { joints: (0..n).map(joint).collect() })
     }
 
-    /// As the metric of [`super::nearest`], where a torque of `noise` N·m counts 1.
+    /// The metric for [`super::nearest`], in which a torque of `noise` N·m counts 1.
     #[must_use]
     pub fn matrix(&self, noise: f64) -> Mat<f64> {
         let p = self.joints.first().map_or(0, Mat::ncols);

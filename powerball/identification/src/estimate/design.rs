@@ -1,6 +1,7 @@
 //! The columns of all joints and their cross products, from which every fit is a small solve.
 //!
-//! Also here: which blocks are held out together; products of columns that are added to a design.
+//! The module also groups the blocks that are held out together, and makes the products of columns that are
+//! added to a design.
 
 use super::solve::{NormalEquations, Solver};
 use super::variable_projection::{FRICTION, Layout};
@@ -207,9 +208,10 @@ impl Gram {
         sum
     }
 
-    /// As [`sum`](Self::sum), with what is known beforehand of an arm: none of its parameters alone makes more
-    /// torque on a joint than was measured there. What logs determine does not move by that; what
-    /// they hardly determine stays where a real arm may be, and the model does not run away on other paths.
+    /// Like [`sum`](Self::sum), with prior knowledge of an arm: none of its parameters alone makes more
+    /// torque on a joint than was measured there. Parameters that logs determine do not change by that; those
+    /// that they hardly determine stay in the range of a real arm, so that the model does not diverge on
+    /// other paths.
     #[must_use]
     pub fn fitted(&self, weights: &[f64], wanted: impl Fn(usize) -> bool) -> NormalEquations {
         self.with_prior(self.sum(weights, wanted))
@@ -373,7 +375,7 @@ pub struct Added {
 }
 
 impl Added {
-    /// Of no rows: k columns added to a design of `size`.
+    /// Products without rows: k columns added to a design of `size`.
     #[must_use]
     pub fn zero(size: usize, k: usize) -> Added {
         Added { cross: vec![vec![0.0; size]; k], square: Mat::zeros(k, k), right: vec![0.0; k] }
@@ -412,7 +414,7 @@ impl Added {
         }
     }
 
-    /// Adds those of other rows, or takes them out again (`sign` −1).
+    /// Adds the products of other rows, or removes them (`sign` −1).
     pub fn add(&mut self, other: &Added, sign: f64) {
         let add = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(t, f)| *t += sign * f);
         self.cross.iter_mut().zip(&other.cross).for_each(|(to, from)| add(to, from));

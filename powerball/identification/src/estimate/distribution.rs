@@ -22,7 +22,7 @@ pub fn t_quantile_975(d: f64) -> f64 {
     high
 }
 
-/// What |t| of Student's t with `d` degrees of freedom exceeds with probability `p`, down to 1e-12.
+/// The value that |t| of Student's t with `d` degrees of freedom exceeds with probability `p`, down to 1e-12.
 #[must_use]
 pub fn t_critical(p: f64, d: f64) -> f64 {
     let (mut low, mut high) = (0.0f64, 1e12f64);

@@ -1,6 +1,6 @@
-//! A fit in the words of a model: values with standard errors that hold for coloured residuals.
+//! A fit as a model: values with standard errors that hold for coloured residuals.
 //!
-//! Also here: the base model along logs; torques over time, for people to look at; the verdict on each joint.
+//! The module also has the base model along logs, torques over time for plots, and the verdict on each joint.
 
 use super::over_blocks;
 use super::reduced::Solution;
@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 /// A parameter with its standard error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ParameterEstimate {
-    /// The parameter's name: the sum it stands for.
+    /// The parameter's name: its sum of parameters.
     pub name: String,
     /// The estimate, SI units.
     pub value: f64,
@@ -117,7 +117,7 @@ pub struct ResidualStats {
 }
 
 impl ResidualStats {
-    /// That of several data together; each with the rows of every joint.
+    /// The statistics of several data together; each comes with the rows of every joint.
     #[must_use]
     pub fn pooled(parts: &[(ResidualStats, Vec<usize>)]) -> Option<ResidualStats> {
         let dof = parts.first()?.0.rms.len();
@@ -261,7 +261,7 @@ pub fn stats_of(solution: &Solution, theta: &[f64]) -> ResidualStats {
 
 // The base model along logs: the rigid arm in its minimal set and the friction of Eq. 16, nothing else.
 
-/// What an identification finds: τ = rigid(q, q̇, q̈) + Eq. 16 friction.
+/// The result of an identification: τ = rigid(q, q̇, q̈) + Eq. 16 friction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BaseModel {
     /// The arm's name.
@@ -273,8 +273,8 @@ pub struct BaseModel {
 }
 
 impl BaseModel {
-    /// The model in the minimal set of a body, whose parameters its own determine. As it is where they do
-    /// not.
+    /// The model in the minimal set of a body, if its own parameters determine that set; else the unchanged
+    /// model.
     #[must_use]
     pub fn in_set_of(mut self, body: &RigidArm) -> BaseModel {
         if let Some(parameters) = in_set_of(&self.parameters, &self.arm, body) {
@@ -332,7 +332,7 @@ pub fn in_set_of(
 /// Between two recordings on the axis of a figure, s.
 const BETWEEN: f64 = 1.0;
 
-/// What one joint's torque was and what was predicted, in the band, by row.
+/// Measured and predicted torque of one joint, in the band, by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TorqueCurve {
     /// Time along the logs, one after the other without their pauses, s.
@@ -400,7 +400,7 @@ pub struct JointVerdict {
     pub interval: [f64; 2],
     /// rms of the error over rms of the measured torque.
     pub relative: f64,
-    /// What white measurement noise alone would leave, N·m.
+    /// Residual of white measurement noise alone, N·m.
     pub noise_floor: f64,
     /// Whether even the upper end of the interval is within the tolerance; `None` where the joint does not
     /// move in these logs.

@@ -254,7 +254,7 @@ pub const MEAN_OVER: f64 = 1.0;
 
 /// How much more the residual's means over some seconds vary than those of independent samples would.
 ///
-/// Coloured residuals tell less than their number of samples; this is by how much.
+/// Coloured residuals carry less information than their number of samples; this is the ratio.
 pub fn variance_inflation(data: &Data<'_>, joint: usize, residual: &[f64], seconds: f64) -> f64 {
     let per_second = data.rate() / data.joints[joint].band.decimation as f64;
     let length = ((seconds * per_second).round() as usize).max(1);

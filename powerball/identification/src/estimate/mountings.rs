@@ -2,8 +2,8 @@
 //!
 //! Each log is reduced under the gravity that it was recorded with, in the minimal set of that gravity. Under
 //! gravity in a general direction an arm has a set that determines those of all its mountings: their
-//! parameters are combinations of its ones. Factors are put into its columns and joined there, so that a
-//! summary need not know which others it will meet.
+//! parameters are combinations of its parameters. Factors are converted to its columns and joined there, so
+//! that a summary need not know which others it will meet.
 
 use super::estimates::ResidualStats;
 use super::reduced::{Solution, solve_reduced};
@@ -50,10 +50,10 @@ impl Together {
         Ok(Together { body, bands, each })
     }
 
-    /// What a fit to all logs leaves of each mounting's.
+    /// The residuals of a fit to all logs, for the logs of each mounting.
     ///
     /// # Errors
-    /// As [`Solution::on`].
+    /// The errors of [`Solution::on`].
     pub fn errors(&self, solution: &Solution, in_band: &[usize]) -> Result<Vec<ResidualStats>, SummaryError> {
         let of = |bands: &Bands| {
             let on = solution.on(&bands.of_joints(in_band))?;

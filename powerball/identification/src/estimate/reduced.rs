@@ -7,7 +7,7 @@ use powerball_logs::summary::{
     Columns, Identity, NODES, OCTAVES, RFactor, SLOW, Steepness, Summary, SummaryError,
 };
 
-/// What a model of a joint's torque has in addition to the minimal set.
+/// The terms of a joint's torque model in addition to the minimal set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FrictionKind {
     /// Eq. 16 of the paper: γ1·tanh(γ2·q̇) + γ3·tanh(γ4·q̇) + γ5·q̇.
@@ -35,7 +35,7 @@ pub struct Solution {
     pub bands: Vec<f64>,
     /// The rows of each joint and octave at these shapes.
     pub(super) parts: Vec<Vec<Part>>,
-    /// Of what the logs were.
+    /// The arm and the options of the logs.
     pub(super) identity: Identity,
 }
 
@@ -77,11 +77,11 @@ impl Solution {
         (left / count, torque / count, rows)
     }
 
-    /// This model on other reduced logs of the same arm and band: what it leaves of logs that took no
-    /// part in it.
+    /// Applies this model to other reduced logs of the same arm and band: its residuals on logs that were not
+    /// fitted.
     ///
     /// # Errors
-    /// [`SummaryError::Differs`] where they are of another arm, set or band.
+    /// [`SummaryError::Differs`] if they are of another arm, set or band.
     pub fn on(&self, summary: &Summary) -> Result<Solution, SummaryError> {
         self.identity.same_as(&summary.identity)?;
         let law = if self.layout.extra > 0 { FrictionKind::Asymmetric } else { FrictionKind::Symmetric };

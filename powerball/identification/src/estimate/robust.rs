@@ -1,12 +1,12 @@
-//! A fit that knocks, spikes and brief collisions do not bend.
+//! A fit that impacts, spikes and brief collisions do not bias.
 //!
 //! A torque sample that lies farther from the model than noise explains is replaced by the model's torque and
-//! as much of the miss as is believed (Huber's pseudo-values), before any filter spreads it over its
-//! neighbours; then the logs are fitted as ever, and again until nothing changes. What is believed: all of a
-//! miss up to three deviations, less of it beyond, nothing from six on (Hampel's ψ). The deviation is the
-//! median one of each joint, which outliers do not move.
+//! a part of the residual (Huber's pseudo-values), before any filter spreads it over its neighbours; then the
+//! logs are fitted as usual, and again until nothing changes. That part is all of a residual up to three
+//! deviations, less of it beyond, nothing from six on (Hampel's ψ). The deviation is the median one of each
+//! joint, which outliers do not move.
 //!
-//! Also here: ratios of sums over blocks that count as independent.
+//! The module also has ratios of sums over blocks that count as independent.
 
 use super::distribution::t_quantile_975;
 use super::reduced::{FrictionKind, Part, Solution, solve_reduced};
@@ -174,7 +174,7 @@ pub fn over_blocks(blocks: &[(f64, f64)]) -> (f64, f64) {
 //
 // Accelerations are second derivatives of measured positions. Their noise stands in the regressor A, and
 // least squares then draws inertias towards zero, however long the logs are. Instruments Z are columns that
-// follow the true ones and know nothing of that noise: Z'·(y − A·θ) = 0 has no such bias. The instruments
+// follow the true ones and are independent of that noise: Z'·(y − A·θ) = 0 has no such bias. The instruments
 // are the model's own columns (as in the IDIM-IV method of Janot, Vandanjon and Gautier 2014) for another
 // observation of the same motion: A is made of every second sample of the positions, Z of those between.
 // Encoder noise of neighbouring samples is independent; noise that is slower than the samples, and noise of

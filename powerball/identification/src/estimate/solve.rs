@@ -136,13 +136,13 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 impl NormalEquations {
-    /// Of no row yet, for `size` coefficients.
+    /// Equations without rows, for `size` coefficients.
     #[must_use]
     pub fn zero(size: usize) -> NormalEquations {
         NormalEquations { gram: Mat::zeros(size, size), right: vec![0.0; size], square: 0.0 }
     }
 
-    /// Of columns and their signal.
+    /// The equations of columns and their signal.
     #[must_use]
     pub fn of(columns: &[impl AsRef<[f64]>], signal: &[f64]) -> NormalEquations {
         let places: Vec<usize> = (0..columns.len()).collect();
@@ -173,7 +173,7 @@ impl NormalEquations {
         self.square += weight * dot(signal, signal);
     }
 
-    /// Adds those of some of the coefficients, which stand at `places`, times a weight.
+    /// Adds the equations of some of the coefficients, those at `places`, times a weight.
     pub fn add(&mut self, places: &[usize], other: &NormalEquations, weight: f64) {
         for (i, at) in places.iter().enumerate() {
             for (k, to) in places.iter().enumerate() {

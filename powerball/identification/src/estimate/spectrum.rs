@@ -13,7 +13,7 @@
 //! freedom each (Whittle's likelihood), by multiplicative steps (Févotte, Bertin and Durrieu 2009, Neural Computation
 //! 21: Itakura–Saito's divergence), which keep them positive.
 //!
-//! Also here: the error that no model can avoid.
+//! The module also estimates the error that no model can avoid.
 
 use powerball_logs::regression::Data;
 use powerball_logs::signal::Band;
@@ -95,7 +95,7 @@ pub(super) fn deconvolved(powers: &[Power]) -> Vec<f64> {
 
 // The error that no model can avoid.
 
-/// What measurement noise alone would leave in the band, by joint, N·m.
+/// Residual of measurement noise alone in the band, by joint, N·m.
 ///
 /// Noise is seen where the motion is not: between neighbouring samples (second differences), and in the
 /// octave above the band. Where the two disagree the noise is not white (a stiff servo's torque trembles
@@ -110,7 +110,7 @@ pub fn noise_floor(data: &Data<'_>) -> Vec<f64> {
     (0..data.dof()).map(of_joint).collect()
 }
 
-/// What measurement noise alone would leave in the band of one joint's torques, along recordings of `rate`
+/// Residual of measurement noise alone in the band of one joint's torques, along recordings of `rate`
 /// Hz.
 pub(crate) fn noise_in_band(torques: &[&[f64]], band: &Band, rate: f64) -> f64 {
     let wider = Band::new(2.0 * band.cutoff, rate);
@@ -129,7 +129,7 @@ pub(crate) fn noise_in_band(torques: &[&[f64]], band: &Band, rate: f64) -> f64 {
     fast.min(deviation(above.collect()) / between) * share
 }
 
-/// Standard deviation from the median of squares, which reversals and knocks do not move.
+/// Standard deviation from the median of squares, which reversals and impacts do not change.
 fn deviation(values: Vec<f64>) -> f64 {
     let mut squares: Vec<f64> = values.into_iter().map(|v| v * v).collect();
     if squares.is_empty() {

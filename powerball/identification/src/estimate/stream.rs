@@ -1,4 +1,4 @@
-//! Least squares over states that need no filter any more: blocks of any number in constant memory.
+//! Least squares over states that need no filter: any number of blocks in constant memory.
 //!
 //! For states of a simulation, or of logs that were filtered elsewhere. Steepnesses of friction are given;
 //! logs as they were recorded go through [`powerball_logs::summary`] instead.
@@ -37,7 +37,7 @@ pub struct Stream<'a> {
     factors: Vec<RFactor>,
 }
 
-/// What a stream's states say.
+/// The fit to the states of a stream.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StreamFit {
     /// The minimal set's values; 0 where nothing determines one.

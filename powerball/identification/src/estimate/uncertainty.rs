@@ -1,7 +1,7 @@
-//! How well a fit is known, all coefficients together, and what they weigh along its logs: what a comparison
-//! of two fits needs in addition to their values.
+//! The joint covariance of all coefficients of a fit, and their weights along its logs: a comparison of two
+//! fits needs both in addition to their values.
 //!
-//! Also here: standard errors under coloured noise.
+//! The module also computes standard errors under coloured noise.
 
 use super::distribution::{freedom_of, t_quantile_975};
 use super::reduced::Solution;
@@ -30,7 +30,7 @@ pub struct Uncertainty {
     pub path: Vec<Path>,
 }
 
-/// What the coefficients weigh in the torque of one joint along logs.
+/// The weights of the coefficients in the torque of one joint along logs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Path {
     /// The coefficients that load the joint, as places in the order of [`Uncertainty`].
@@ -42,7 +42,7 @@ pub struct Path {
 }
 
 impl Uncertainty {
-    /// That of a solution of the minimal set `names`.
+    /// The uncertainty of a solution of the minimal set `names`.
     #[must_use]
     pub fn of(names: &[String], solution: &Solution, errors: &StandardErrors) -> Uncertainty {
         let layout = solution.layout;
@@ -92,8 +92,8 @@ impl Uncertainty {
     }
 }
 
-/// Eq. 16's columns of a joint at one velocity, and those of the tangents of its steepnesses: what the
-/// coefficients of [`Uncertainty`] are multiplied with, free of units but for γ5's.
+/// Eq. 16's columns of a joint at one velocity, and those of the tangents of its steepnesses: the factors of
+/// the coefficients of [`Uncertainty`], without units except for that of γ5.
 #[must_use]
 pub fn friction_row([gamma2, gamma4]: [f64; 2], velocity: f64) -> [f64; FRICTION] {
     let saturating = |gamma: f64| (gamma * velocity).tanh();
@@ -122,16 +122,16 @@ fn path(solution: &Solution, joint: usize) -> Path {
 //
 // H⁻¹·(Σ_g w_g²·λ_g·D_g)·H⁻¹, H = Σ_g w_g·D_g, D_g = A_gᵀ·A_g.
 //
-// The powers come from what the fit left in each octave. The fit has adapted to the noise, more in slow
-// octaves than in fast ones; the expectation of what it leaves is linear in the λ,
+// The powers come from the residual of the fit in each octave. The fit has adapted to the noise, more in slow
+// octaves than in fast ones; the expectation of the residual is linear in the λ,
 //
 // E‖r_g‖² = (n_g − 2·w_g·tr(H⁻¹D_g))·λ_g + Σ_h w_h²·tr(H⁻¹D_g H⁻¹D_h)·λ_h,
 //
 // and solving these equations gives unbiased powers (Rao's MINQUE for this structure). How well a power is
 // known enters by Satterthwaite's degrees of freedom.
 //
-// Octaves leak into each other, so noise is not quite independent between them. What counts in the covariance
-// are powers from which the leaks are taken out (`spectrum.rs`).
+// Octaves leak into each other, so noise is not quite independent between them. The covariance uses powers
+// from which the leaks are removed (`spectrum.rs`).
 
 /// The errors of all coefficients, tangents among them.
 #[derive(Clone, Debug, PartialEq)]
@@ -150,7 +150,7 @@ struct Group {
     octave: usize,
     weight: f64,
     rows: f64,
-    /// What the fit left, sum of squares.
+    /// Residual of the fit, sum of squares.
     left: f64,
     /// H⁻¹·D.
     turned: Mat<f64>,
@@ -240,7 +240,7 @@ fn powers(groups: &[Group]) -> Vec<(f64, f64)> {
         .iter()
         .enumerate()
         .map(|(g, group)| {
-            // A power cannot be below what was left as it is; equations of few rows can say so.
+            // A power cannot be below the uncorrected residual; equations of few rows can give such a value.
             let power = solved[(g, 0)].max(group.left / group.rows);
             (power, (group.rows - taken[g]).max(1.0))
         })

@@ -4,8 +4,8 @@
 //! It requires of its rows only their cross products at given steepnesses, so rows in memory and reduced logs
 //! are fitted alike.
 //!
-//! Also here: the steepnesses γ2, γ4 of the tanh model; rows of a regression whose friction steepnesses are free, whatever they are
-//! kept in.
+//! The module also has the steepnesses γ2, γ4 of the tanh model, and the trait for rows of a regression whose
+//! friction steepnesses are free.
 
 use super::solve::{NormalEquations, Solver};
 use faer::Mat;
@@ -14,7 +14,7 @@ use powerball_logs::regression::{Data, Recording};
 use powerball_logs::summary::{NODES, Steepness};
 use std::sync::Arc;
 
-/// What a fit starts from where a similar one has been made.
+/// The start of a fit from a similar fit.
 pub(super) struct Start<'a> {
     pub shapes: &'a [[f64; 2]],
     pub weights: &'a [f64],
@@ -227,7 +227,7 @@ pub(super) fn range(top: f64) -> (f64, f64) {
     (0.2 / top, 2000.0 / top)
 }
 
-/// Where a search begins that finds nothing: a step and a bend.
+/// The start of a search without earlier results: a step and a bend.
 #[must_use]
 pub(super) fn first((low, high): (f64, f64)) -> [f64; 2] {
     [high / 10.0, low * 20.0]
@@ -309,7 +309,7 @@ pub(super) fn search<R: SeparableRows>(
 
 // Rows of a regression whose friction steepnesses are free, whatever they are kept in.
 
-/// Where a coefficient stands: the minimal set, five friction columns a joint, further columns.
+/// The order of the coefficients: the minimal set, five friction columns a joint, further columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
     /// Inertial columns.
@@ -321,7 +321,7 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// That of some data's rows.
+    /// The layout of some data's rows.
     #[must_use]
     pub fn of(data: &Data<'_>, extra: usize) -> Layout {
         let (dof, set) = (data.dof(), data.inertial_columns());
@@ -377,11 +377,11 @@ pub(super) struct Scatter {
 /// Cross products of trial columns on one joint, by trial.
 #[derive(Debug)]
 pub(super) struct Trials {
-    /// With the columns of all rows, columns × trials.
+    /// Products of the trial columns with the columns of all rows, columns × trials.
     pub cross: Mat<f64>,
-    /// With each other.
+    /// Products of the trial columns with each other.
     pub square: Mat<f64>,
-    /// With the torque.
+    /// Products of the trial columns with the torque.
     pub score: Vec<f64>,
 }
 

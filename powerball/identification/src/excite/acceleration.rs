@@ -1,4 +1,4 @@
-//! Accelerations that an arm file does not limit, as an imported one does not: what the torque limits allow.
+//! Acceleration limits from torque limits, for arm files without them, such as imported ones.
 
 use super::shape::poses;
 use super::{Error, JointLimits, MassSource, Masses};
@@ -7,12 +7,12 @@ use dyngen::{Arm, Evaluator, Function, Model, SetKind};
 /// Share of a joint's torque that may accelerate it; the rest is for gravity, friction and the other joints.
 const SHARE: f64 = 0.5;
 
-/// The arm with an acceleration limit for every joint that has a torque limit but none of acceleration: half of its torque
-/// over the largest B_ii of poses within its positions; and what is to be reported about that. Where the
-/// masses are not known, the arm as it is.
+/// The arm with an acceleration limit for every joint that has a torque limit but none of acceleration: half
+/// of its torque over the largest B_ii of poses within its positions; and a note about that. Without masses
+/// the arm is not changed.
 ///
 /// # Errors
-/// As [`Masses::parse`].
+/// The errors of [`Masses::parse`].
 pub(super) fn proposed(arm: &Arm, masses: Option<&MassSource>) -> Result<(Arm, Option<String>), Error> {
     let missing: Vec<usize> = (0..arm.dof())
         .filter(|i| arm.joints[*i].acceleration.is_none() && arm.joints[*i].torque.is_some())

@@ -1,6 +1,6 @@
-//! What a path must keep in addition to its joints' limits: torque, floor, and its own links.
+//! Constraints of a path in addition to its joints' limits: torque, floor, and its own links.
 //!
-//! Also here: what the joints may do, from the arm file; what stands around an arm; capsules.
+//! The module also has the joint limits of the arm file, the space around an arm, and capsules.
 
 use super::Mounting;
 use super::fourier::Fourier;
@@ -29,7 +29,7 @@ pub struct Space {
     pub clearance: f64,
 }
 
-/// What the paths of one mounting must keep.
+/// The constraints of the paths of one mounting.
 #[derive(Clone, Debug)]
 pub struct Constraints {
     /// Positions, velocities and accelerations.
@@ -38,7 +38,7 @@ pub struct Constraints {
     pub space: Option<Space>,
     /// Torques, where they are looked at.
     pub load: Option<Load>,
-    /// Where the arm is before it goes to the path's beginning, each joint straight there, rad.
+    /// Position of the arm before it moves to the path's beginning, each joint straight there, rad.
     pub from: Option<Vec<f64>>,
 }
 
@@ -75,7 +75,7 @@ impl Constraints {
         self.lack_of_space(&motion) + self.excess_of_torque(&motion)
     }
 
-    /// What a pose lacks in distance, in radii; 0 where it is free.
+    /// The missing distance of a pose, in radii; 0 if it is free.
     #[must_use]
     pub fn lacks(&self, q: &[f64]) -> f64 {
         let Some(space) = &self.space else { return 0.0 };
@@ -235,7 +235,7 @@ pub const RADIUS: f64 = 0.06;
 /// The distance that capsules keep from each other and from the floor, m, where none is given.
 pub const CLEARANCE: f64 = 0.02;
 
-/// A floor at its base that blocks more than this share of an arm's poses is not what it was built on.
+/// An arm does not stand on a floor at its base that blocks more than this share of its poses.
 const HANGS: f64 = 0.95;
 
 /// A floor's height above the base frame's origin, m; or that there is none.
@@ -289,7 +289,7 @@ impl Segment {
         self.from + (self.to - self.from) * share
     }
 
-    /// What is left when lengths (m) are cut off at both ends; `None` where nothing is.
+    /// The segment without lengths (m) at both ends; `None` if nothing remains.
     #[must_use]
     pub fn cut(&self, at_from: f64, at_to: f64) -> Option<Segment> {
         let length = self.length();

@@ -19,9 +19,9 @@ pub struct Harmonics {
 
 /// A periodic path of all joints, and how it is run through.
 ///
-/// The series themselves (Eq. 18) are at full velocity at every time. To start and stop at rest the path
-/// stays as it is and time is bent: the series is run through at the velocity σ̇(t), which rises smoothly
-/// from 0 to 1 within `ramp` seconds and falls again at the end.
+/// The series themselves (Eq. 18) are at full velocity at every time. To start and stop at rest, the path is
+/// unchanged and time is warped: the series is run through at the velocity σ̇(t), which rises smoothly from 0
+/// to 1 within `ramp` seconds and falls again at the end.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fourier {
     /// Fundamental frequency ω_f, rad/s.

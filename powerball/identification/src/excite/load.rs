@@ -1,4 +1,4 @@
-//! The torque that a path takes, against the joints' limits.
+//! The torque that a path needs, compared with the joints' limits.
 
 use super::Error;
 use super::constraints::JointLimits;
@@ -22,7 +22,7 @@ const OWN_WEIGHT: f64 = 0.4;
 /// A rotor takes about this share of a joint's torque at the joint's largest acceleration.
 const ROTOR: f64 = 0.1;
 
-/// What the arm's links weigh, from a model or guessed.
+/// The masses of the arm's links, from a model or estimated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Masses {
     /// All parameters, eleven a link, SI units.
@@ -31,7 +31,7 @@ pub struct Masses {
     pub friction: Option<Vec<[f64; 5]>>,
     /// Share of every torque limit that stays unused, for what is not known.
     pub reserve: f64,
-    /// Where it comes from, in words.
+    /// A sentence about the source of the masses.
     pub origin: String,
 }
 
@@ -213,7 +213,7 @@ impl Load {
         torques
     }
 
-    /// What may be used of each joint's torque limit, N·m; infinite where there is none.
+    /// The usable part of each joint's torque limit, N·m; infinite if there is none.
     #[must_use]
     pub fn limits(&self) -> &[f64] {
         &self.limits

@@ -1,6 +1,6 @@
 //! Exciting trajectories: finite Fourier series whose base regressor is well conditioned, within the arm's
 //! limits, off the floor and clear of the arm itself, for one mounting of the base or several. Eq. 17 to 20
-//! of the paper. [`excite`] is the whole way from an arm to trajectories.
+//! of the paper. [`excite`] makes trajectories from an arm in one call.
 
 mod acceleration;
 mod constraints;
@@ -38,7 +38,7 @@ pub enum Error {
     /// A setting makes no sense: what is wrong with it.
     #[error("{0}")]
     Setting(String),
-    /// There is no room for the arm in any pose.
+    /// The arm touches itself or the floor in every pose.
     #[error(
         "the arm touches itself or the floor in every pose that was tried: its capsules are too \
                     thick for it, or the floor is too high"
@@ -52,7 +52,7 @@ pub enum Error {
     NoStart {
         /// How the base stands.
         mounting: Mounting,
-        /// What is in the way.
+        /// The obstacle.
         why: String,
     },
     /// The trajectory does not keep its constraints between the instants of the search: where.

@@ -24,7 +24,7 @@ pub struct Figures {
     pub mean: f64,
 }
 
-/// What makes a path a good one.
+/// The criterion of a good path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Criterion {
     /// G of Eq. 17, cond(Y) + λ₂/σ_p(Y).
@@ -37,7 +37,7 @@ pub enum Criterion {
 }
 
 impl Figures {
-    /// What is to be as small as can be.
+    /// The value that the search minimises.
     #[must_use]
     pub fn objective(&self, criterion: Criterion) -> f64 {
         match criterion {
@@ -66,9 +66,9 @@ impl Figures {
 /// Condition numbers as publications give them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conditions {
-    /// Of the regressor in SI units, with rotor inertias as they act at the joint, k²·Im.
+    /// Condition number of the regressor in SI units, with rotor inertias as they act at the joint, k²·Im.
     pub raw: f64,
-    /// With each column divided by its own length.
+    /// Condition number with each column divided by its own length.
     pub normalised: f64,
 }
 
@@ -112,10 +112,10 @@ pub struct Objective {
 impl Objective {
     /// The objective for a set of an arm, given as it is mounted for each path; a path is judged at
     /// `instants` instants of one period. Where there are several mountings, the set is that of gravity in a
-    /// general direction: what any of them determines.
+    /// general direction: it has all that any of them determines.
     ///
     /// # Errors
-    /// As [`Evaluator::new`].
+    /// The errors of [`Evaluator::new`].
     pub fn new(models: &[&Model], kind: SetKind, instants: usize) -> Result<Objective, Error> {
         let first = *models.first().ok_or_else(|| Error::Setting("no mounting was given".to_string()))?;
         let general;

@@ -19,7 +19,7 @@ const PLACES: usize = 50;
 /// Samples a second at which found paths are compared.
 const JUDGED: f64 = 50.0;
 
-/// What path to look for, and how long.
+/// Settings of the path and of its search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Number of harmonics N of each joint.
@@ -32,7 +32,7 @@ pub struct Settings {
     pub ramp: f64,
     /// Share of range, velocity and acceleration that stays unused.
     pub margin: f64,
-    /// What makes a path a good one.
+    /// The criterion of a good path.
     pub criterion: Criterion,
     /// How many paths are judged in all.
     pub evaluations: usize,
@@ -81,7 +81,7 @@ pub struct Excitation {
     pub usual: Figures,
 }
 
-/// An arm as it is mounted for a path, and what the path must keep.
+/// An arm as it is mounted for a path, and the constraints of the path.
 #[derive(Clone, Debug)]
 pub struct Task<'a> {
     /// The arm in this mounting.
@@ -105,7 +105,7 @@ struct Judged<J> {
     paths: Vec<Candidate>,
     violation: f64,
     value: f64,
-    /// What `judge` returned for them; nothing where they break the constraints and were not judged.
+    /// The result of `judge` for them; `None` if they break the constraints and were not judged.
     said: Option<J>,
 }
 
@@ -202,8 +202,8 @@ pub fn search<J: Clone>(
 /// `judge` returned for them, and of the middle ones of the random starts.
 ///
 /// # Errors
-/// Settings that make no sense, [`Error::NoPose`] where there is no room at all, and [`Error::NoPath`] where
-/// no path that keeps the constraints was found.
+/// Invalid settings, [`Error::NoPose`] if no pose keeps the constraints, and [`Error::NoPath`] if no path
+/// that keeps the constraints was found.
 pub fn search_all<J: Clone>(
     constraints: &[&Constraints],
     settings: &Settings,

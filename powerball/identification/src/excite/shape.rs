@@ -2,9 +2,8 @@
 //! floor.
 //!
 //! The origins of the frames, and the corners between the parts of length d and a of each row, are a polyline
-//! from the base to the last frame (and the tool). Every part of it that has a length is a capsule. That is
-//! all an arm file tells of a shape: joints that bulge, and cables, are what the radius and the clearance are
-//! for.
+//! from the base to the last frame (and the tool). Every part of it that has a length is a capsule. An arm
+//! file has no more of a shape: the radius and the clearance account for thick joints and cables.
 
 use super::constraints::{JointLimits, Segment};
 use chacha20::ChaCha8Rng;
@@ -22,7 +21,7 @@ const JOINED: f64 = 6.0;
 /// Poses that tell what always touches and what never moves.
 const POSES: usize = 256;
 
-/// What is nearest.
+/// The nearest pair in a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Contact {
     /// Two links, from 1; 0 is the base.
@@ -206,7 +205,7 @@ impl Shape {
         self.radius
     }
 
-    /// What is nearest in a pose; `None` where nothing can touch.
+    /// The nearest pair in a pose; `None` if nothing can touch.
     #[must_use]
     pub fn nearest(&self, q: &[f64], floor: Option<&Floor>) -> Option<Nearness> {
         let vertices = self.vertices(q);

@@ -1,4 +1,5 @@
-//! From an arm to exciting trajectories: what each mounting's path must keep, the search, and a last look.
+//! From an arm to exciting trajectories: the constraints of each mounting's path, the search, and a last
+//! check.
 
 use super::acceleration;
 use super::{
@@ -22,9 +23,9 @@ pub struct ExciteOptions<'a> {
     pub search: Settings,
     /// Samples a second.
     pub rate: f64,
-    /// How the base stands: a trajectory for each. As filed, where there is none.
+    /// The mountings of the base: a trajectory for each. If empty, the mounting of the arm file.
     pub mountings: Vec<Mounting>,
-    /// Floor and links, where they are looked at.
+    /// Floor and links, if they are checked.
     pub collision: Option<Collision>,
     /// The arm's masses for the torque limits, where those are looked at.
     pub masses: Option<MassSource>,
@@ -46,7 +47,7 @@ pub struct Collision {
     pub clearance: f64,
 }
 
-/// Where an arm's masses are from.
+/// The source of an arm's masses.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MassSource {
     /// Guessed from the links' capsules.
@@ -84,15 +85,15 @@ impl Default for ExciteOptions<'_> {
 /// One trajectory, and how it keeps its limits.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
-    /// How the base stands for it.
+    /// The mounting of the base for this trajectory.
     pub mounting: Mounting,
     /// The trajectory's samples.
     pub motion: Motion,
-    /// Where it is nearest to what it must keep.
+    /// The point at which the trajectory is nearest to a limit.
     pub tightest: Tightest,
     /// The limits of the file.
     pub limits: Limits,
-    /// What it was to keep, its margin off.
+    /// The constraints of the search, with its margin.
     pub constraints: Constraints,
 }
 
@@ -109,7 +110,7 @@ pub struct Excited {
     pub conditions: Conditions,
     /// One for each mounting.
     pub trajectories: Vec<Trajectory>,
-    /// What had to be assumed, in words.
+    /// The assumptions, a sentence each.
     pub assumed: Vec<String>,
 }
 
@@ -262,7 +263,7 @@ fn masses(
     match (source, mountings.first()) {
         (MassSource::Guess, _) => Masses::guess(model, shape, &limits.0),
         (MassSource::Values { text, file }, Some(Mounting::Filed)) => Masses::parse(text, file, model),
-        // Values belong to the arm as it is filed.
+        // Values belong to the arm as mounted in its file.
         (MassSource::Values { text, file }, _) => Masses::parse(text, file, &Model::derive(arm.clone())?),
     }
 }

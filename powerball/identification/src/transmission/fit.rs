@@ -1,11 +1,11 @@
 //! Ratio and friction of a transmission from products of columns, with standard errors.
 //!
-//! Both torques are measured. Noise of the motor's, and what the law lacks, stand on the left of the equation
-//! and bias nothing. Noise of the link's torque stands in a column and would draw k towards zero. Its
-//! variance is known: it is seen above the band and between neighbouring samples. What it adds to the
-//! column's square is taken off (the corrected least squares of Fuller, *Measurement error models*, 1987,
-//! section 2.2). Total least squares would need the ratio of both noises, and would take what the law lacks
-//! for noise.
+//! Both torques are measured. Noise of the motor's torque, and the error of the law, are on the left side of
+//! the equation and cause no bias. Noise of the link's torque stands in a column and would draw k towards
+//! zero. Its variance is known: it is seen above the band and between neighbouring samples. What it adds to
+//! the column's square is taken off (the corrected least squares of Fuller, *Measurement error models*, 1987,
+//! section 2.2). Total least squares would need the ratio of both noises, and would treat the error of the
+//! law as noise.
 
 use super::products::{Column, Evidence, Products};
 use super::search::Candidate;
@@ -21,7 +21,7 @@ pub(super) struct FittedLaw {
     pub theta: Vec<f64>,
     /// Which width.
     pub width: usize,
-    /// What was added.
+    /// The effects that were added.
     pub effects: Vec<Candidate>,
     /// 1, or −1 where the motor counts against the link.
     sign: f64,
@@ -37,7 +37,7 @@ fn normal(products: &Products, columns: &[Column], noise: f64, sign: f64) -> Nor
 }
 
 impl FittedLaw {
-    /// Of the widths, and of `options` in addition to what is `fixed`, those that leave the least.
+    /// Chooses the width, and those of `options` in addition to the `fixed` ones, with the smallest residual.
     pub(super) fn best(
         products: &Products,
         noise: f64,

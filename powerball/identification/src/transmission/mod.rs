@@ -1,4 +1,4 @@
-//! The transmission between two torques of one log: of a joint's motor, and on its link's side.
+//! The transmission between two torques of one log: that of a joint's motor, and that on its link's side.
 //!
 //! Where a log holds both, their difference is the gear: ratio, rotor and friction, without any rigid model.
 //! By joint, in the band and with phases of rest left out as everywhere,
@@ -12,7 +12,7 @@
 //! |---|---|
 //! | `products` | logs on even grids; the signals that a motor's torque is compared with, and their products by block |
 //! | `fit` | ratio and friction from products; standard errors |
-//! | `search` | what a transmission may hold in addition to friction and rotor, and which of it is there, judged on logs that took no part in a fit |
+//! | `search` | effects of a transmission in addition to friction and rotor, judged on logs that were not fitted |
 
 mod fit;
 mod products;
@@ -77,13 +77,13 @@ fn of_joint(arm: &Arm, grid: &Grid, joint: JointNumber) -> Result<Transmission, 
 
 // The result, and its words: the `transmission` of identified.json and explained.json.
 
-/// What the logs show about a joint's transmission.
+/// The result about a joint's transmission.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum JointTransmission {
-    /// It is known.
+    /// The logs determine the transmission.
     Known(Transmission),
-    /// These logs do not tell it.
+    /// These logs do not determine the transmission.
     Unknown(Unknown),
 }
 
@@ -119,9 +119,9 @@ pub struct Transmission {
     pub offset: f64,
     /// Share of the motor torque's rms that stays on logs that were not fitted.
     pub left: f64,
-    /// That share with the effects.
+    /// Share of the motor torque's rms that stays with the effects included.
     pub left_with: f64,
-    /// What was found in addition to friction and rotor, in the order in which it was found. Ratio, friction
+    /// The effects that were found in addition to friction and rotor, in this order. Ratio, friction
     /// and rotor are those fitted together with these.
     pub effects: Vec<TransmissionEffect>,
 }

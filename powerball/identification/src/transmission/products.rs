@@ -1,7 +1,7 @@
-//! What the logs show about one joint's transmission: products of its columns, by block.
+//! The data about one joint's transmission: products of its columns, by block.
 //!
-//! Also here: the signals that a motor's torque is compared with; logs with both torques on even grids, and which part
-//! each belongs to.
+//! The module also makes the signals that a motor's torque is compared with, and puts logs with both torques
+//! on even grids, each in its part.
 
 use crate::estimate::{NormalEquations, noise_in_band};
 use dyngen::Arm;
@@ -100,10 +100,10 @@ impl Evidence {
     }
 }
 
-/// What the logs show about a joint.
+/// The products of a joint's columns from the logs.
 ///
 /// # Errors
-/// In words, where they say nothing.
+/// The reason, if the logs hold no information about it.
 pub(super) fn evidence(arm: &Arm, grid: &Grid, joint: JointNumber) -> Result<(Evidence, Scales), String> {
     let j = joint.index();
     let used = || grid.pieces.iter().filter(move |piece| !piece.motor(j).is_empty());
@@ -196,7 +196,7 @@ pub(super) struct Scales {
     pub distances: Vec<f64>,
     /// Velocities of a Stribeck bump, rad/s.
     pub bumps: Vec<f64>,
-    /// Where the sign of a law has changed, s/rad.
+    /// Steepness of the change of a law's sign, s/rad.
     steepness: f64,
 }
 

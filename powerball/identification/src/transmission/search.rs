@@ -1,6 +1,6 @@
-//! Which effects a transmission holds, judged on logs that took no part in a fit.
+//! The search for effects of a transmission, judged on logs that were not fitted.
 //!
-//! Also here: what a transmission may hold in addition to friction and rotor.
+//! The module also lists the effects that a transmission may have in addition to friction and rotor.
 
 use super::Transmission;
 use super::fit::{FittedLaw, noise_share};
@@ -12,10 +12,10 @@ use std::collections::BTreeMap;
 
 /// An effect must lower the squared error by this share whichever part of the logs is held out.
 const LEAST_GAIN: f64 = 0.1;
-/// What it takes away must be this share of the motor torque's rms: less no user would notice.
+/// Least share of the motor torque's rms that an effect must explain: no user would notice less.
 const LEAST_SIZE: f64 = 0.01;
 /// It may move the ratio by this share, or by what the ratio without it is uncertain by, twice its standard
-/// error: what moves it further stands for the link's torque itself.
+/// error: an effect that moves it further replaces the link's torque itself.
 const SAME_RATIO: f64 = 0.2;
 /// Probability of so large a coefficient by chance, by blocks. They depend on each other a little, and some
 /// twenty settings are tried on each joint.
@@ -146,7 +146,7 @@ fn sure(evidence: &Evidence, fixed: &[Candidate], kind: Kind) -> Option<Candidat
     (agrees && last.abs() > error * critical(evidence, whole.columns.len())).then_some(candidate)
 }
 
-/// What is reported about a joint, torques at the link in `unit`.
+/// The report about a joint, torques at the link in `unit`.
 pub(super) fn tell(
     evidence: &Evidence,
     scales: &Scales,
