@@ -1,12 +1,12 @@
-//! From what a model leaves to named effects, and to the model that has them.
+//! From the residual of a model to named effects, and to a model with these effects.
 //!
-//! | folder | what lives there |
+//! | module | content |
 //! |---|---|
-//! | [`effects`] | one file an effect that a model may lack: **how a log row becomes a column** |
+//! | [`effects`] | one file for each effect that a model may lack: **how a log row becomes a column** |
 //! | [`mod@explain`] | the pipeline that finds effects; its `comparison` **decides that a name is given** |
-//! | [`experiment`] | where names stay open: the path on which they differ most, and what its log decides |
+//! | [`experiment`] | for open names: the path on which they differ most, and the decision by its log |
 //! | [`torque_model`] | a model with its effects: its file, its torque along logs, its controller's code |
-//! | [`watch`] | whether a model still holds, along a stream: since when not, on which joints and why |
+//! | [`watch`] | tests along a stream whether a model still holds: since when not, on which joints and why |
 //!
 //! [`explain()`] is the API, and [`Rule`] holds every threshold.
 //!

@@ -1,4 +1,4 @@
-//! What an explanation is given in addition to the logs, and why there may be none.
+//! The options of an explanation, and its errors.
 
 use super::rule::Rule;
 use super::torque_model::{FileError, TorqueModel, Unchanged};
@@ -6,16 +6,16 @@ use powerball_controller::JointNumber;
 use powerball_logs::Progress;
 use powerball_logs::regression::{DataError, DataOptions};
 
-/// What an explanation is given in addition to the arm and the logs. The default knows nothing and reports to
-/// nobody.
+/// The options of an explanation in addition to the arm and the logs. By default there is no known model and
+/// no progress report.
 #[derive(Clone, Debug, Default)]
 pub struct ExplainOptions<'a> {
     /// The thresholds of the rule.
     pub rule: Rule,
     /// How logs are prepared.
     pub data: DataOptions,
-    /// What is known already: the model of an earlier explanation for the same arm file. It is taken out of
-    /// the logs as it stands; what is found comes to it.
+    /// The known model: that of an earlier explanation for the same arm file. Its torque is subtracted from
+    /// the logs without changes; new effects are added to it.
     pub known: Option<TorqueModel>,
     /// Names that an experiment has ruled out.
     pub ruled_out: Vec<RuledOut>,
@@ -30,9 +30,9 @@ pub struct RuledOut {
     pub effect: String,
     /// The joints.
     pub joints: Vec<JointNumber>,
-    /// The name that the experiment speaks for instead.
+    /// The name that the experiment favours instead.
     pub in_favour_of: String,
-    /// What showed it.
+    /// The reason.
     pub why_not: String,
 }
 

@@ -1,4 +1,5 @@
-//! An arm that moves as a torque model says, under a control law that knows the same model or another one.
+//! Simulation of an arm that moves by a torque model, under a control law that uses the same model or another
+//! one.
 //!
 //! B(q)·q̈ + C·q̇ + g + friction + effects = τ, with a zero-order hold of τ over a cycle. Each of ten steps a cycle is
 //! linearly implicit in Eq. 16: friction is s·q̇' against the new velocity q̇', with s = f(q̇')/q̇' found by iteration, so that
@@ -43,7 +44,7 @@ pub enum Law {
     },
 }
 
-/// What a controller sees in a cycle; n values each.
+/// The input of a controller in a cycle; n values each.
 #[derive(Clone, Copy, Debug)]
 pub struct Cycle<'a> {
     /// Since the path began, s.
@@ -56,7 +57,7 @@ pub struct Cycle<'a> {
     pub reference: [&'a [f64]; 3],
 }
 
-/// What came of it: n values a sample, one sample a cycle.
+/// The simulated motion: n values per sample, one sample per cycle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Moved {
     /// Positions, rad.
@@ -74,7 +75,7 @@ pub enum SimulateError<E> {
     Input(String),
     /// The arm ran away: joint from 1, time in s.
     Lost(usize, f64),
-    /// What the controller raised.
+    /// An error of the controller.
     Controller(E),
 }
 
@@ -96,10 +97,10 @@ pub fn simulate(
     })
 }
 
-/// As [`simulate`], with a controller of the caller's: it gives n torques, N·m.
+/// Like [`simulate`], with a controller of the caller, which gives n torques, N·m.
 ///
 /// # Errors
-/// As [`simulate`], and what the controller raises.
+/// The errors of [`simulate`], and those of the controller.
 pub fn simulate_with<E>(
     arm: &Arm,
     plant: &ModelFile,

@@ -22,7 +22,7 @@ pub enum Settings {
     Both,
 }
 
-/// What it is, by joint.
+/// Figures of this effect in a result, by joint.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// The constant torque, N·m.

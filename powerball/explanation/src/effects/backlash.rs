@@ -10,7 +10,7 @@ use serde::Serialize;
 /// its load turns; one that is loaded slowly is off from the motor by half the gap.
 pub(super) struct Backlash;
 
-/// What of the backlash shows.
+/// The visible part of the backlash.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Settings {
     /// The rigid torque is missing while the motor crosses a gap after a reversal of its motion.
@@ -32,7 +32,7 @@ pub enum Settings {
     },
 }
 
-/// What it is.
+/// Figures of this effect in a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// The gap, rad.

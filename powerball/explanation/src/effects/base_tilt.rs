@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// that its products with the tilt are columns of their own ([`Settings::unshown`]).
 pub(super) struct BaseTilt;
 
-/// What is fitted in addition to the tilt.
+/// Settings of this effect: what is fitted in addition to the tilt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// Whether the parameters that level gravity does not show are fitted too
@@ -27,7 +27,7 @@ pub struct Settings {
     pub unshown: bool,
 }
 
-/// What it is.
+/// Figures of this effect in a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// The turn of the base about its x and y axes, rad.

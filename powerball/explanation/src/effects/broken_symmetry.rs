@@ -17,7 +17,7 @@ pub struct Settings {
     pub parameter: Parameter,
 }
 
-/// What it is.
+/// Figures of this effect in a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// The parameters' names.

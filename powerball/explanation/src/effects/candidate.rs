@@ -1,6 +1,6 @@
-//! One way in which an effect could show.
+//! A candidate: one way in which an effect could appear in logs.
 //!
-//! Also here: the signal that an effect depends on; a figure of several joints.
+//! The module also has the signal that an effect depends on ([`Axis`]), and figures of several joints.
 
 use super::{Effect, Settings};
 use powerball_controller::JointNumber;
@@ -28,7 +28,7 @@ impl Window {
         Window { log: data.logs[log].clone(), from, to, offset }
     }
 
-    /// The ends of some, none where one goes on to its log's end; empty where all do.
+    /// The ends of some windows, `None` for one that lasts to its log's end; empty if all do.
     #[must_use]
     pub fn ends(windows: &[Window]) -> Vec<Option<f64>> {
         let end = |w: &Window| w.to.is_finite().then_some(w.to);
@@ -48,9 +48,9 @@ impl Window {
 pub struct Candidate {
     /// The joints it acts on, at least one.
     pub joints: Vec<JointNumber>,
-    /// What of its law is no coefficient, and so of which effect it is.
+    /// The settings of its law, which also say which effect it is.
     pub settings: Settings,
-    /// Where it is, if not everywhere.
+    /// The windows in which it acts; empty if it acts everywhere.
     pub windows: Vec<Window>,
     /// How many alternatives the search chose this one from: what looking elsewhere costs.
     pub searched: f64,
@@ -118,7 +118,7 @@ pub(super) fn scaled(setting: f64, factor: f64, share: f64) -> f64 {
 
 // The signal that an effect depends on: the horizontal axis of the plot that shows it.
 
-/// What a residual is to be drawn over to see an effect on a joint.
+/// The signal against which a residual is plotted to show an effect on a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Axis {
     /// A joint's position.
@@ -140,7 +140,7 @@ pub enum Axis {
     Warmth,
     /// Time.
     Time,
-    /// What the effect itself adds: for those that depend on many signals at once.
+    /// The torque of the effect itself: for effects that depend on many signals at once.
     Law,
 }
 

@@ -18,22 +18,23 @@ pub(super) struct ContactWrench;
 /// How its force goes through its windows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Settings {
-    /// It is the same from the window's beginning to its end.
+    /// The force is constant from the window's beginning to its end.
     Constant,
     /// Half a wave: largest in the middle of the window.
     Push,
-    /// Of any shape: linear between five instants, the first and the last of which are the window's ends.
+    /// A force of any shape: linear between five instants, the first and the last of which are the window's
+    /// ends.
     Knots,
 }
 
-/// What it is, one entry a window.
+/// Figures of this effect in a result, one entry per window.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// When it ended, in the log's own t, s.
     pub end_time: Vec<f64>,
     /// The force in the base frame, N; of one that changes the largest.
     pub force: Vec<Vec<f64>>,
-    /// Where it is taken to act: on the tool. At another point of the link it has another size.
+    /// The assumed point of action, on the tool. At another point of the link the force has another size.
     pub point: Vec<Point>,
     /// When it began, in the log's own t, s.
     pub start_time: Vec<f64>,
@@ -105,7 +106,7 @@ const LONGER: [f64; 4] = [1.0, 1.4, 2.0, 2.8];
 const LATE: [f64; 3] = [-0.25, 0.0, 0.25];
 /// Instants between which a force of any shape is linear.
 const KNOTS: usize = 5;
-/// What is longer leans on the arm, and does not push it, s.
+/// A longer force leans on the arm and does not push it, s.
 pub(crate) const LONGEST_PUSH: f64 = 4.0;
 /// Grid of the same push in other logs, s: its force is known there, so that a row more or less makes a difference.
 const FINE: f64 = 0.1;
@@ -154,7 +155,7 @@ impl Effect for ContactWrench {
         c.iter().all(|f| f.abs() < MOST)
     }
 
-    /// When the other logs have the same force: nothing of it is fitted to them but its times. It must
+    /// The times at which other logs have the same force: only its times are fitted to them. It must
     /// explain more than the best of all windows of a log explains by chance.
     fn seen_in(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
         let (data, rule) = (context.data, context.rule);
@@ -196,9 +197,9 @@ impl Effect for ContactWrench {
     }
 }
 
-/// A constant force in the window that explains most, and pushes about its middle. Short windows are all tried, longer
-/// ones on a coarse grid, whose ends are then moved. None begins where the arm sets off from rest: an error there is of how
-/// it sets off. A push that goes on is found from then on.
+/// A constant force in the window that explains most, and pushes about its middle. Short windows are all
+/// tried, longer ones on a coarse grid, whose ends are then moved. No window begins where the arm starts from
+/// rest: an error there comes from the start itself. A push that lasts longer is found from then on.
 fn search(context: &Context<'_>) -> Option<Vec<Candidate>> {
     let (data, fit) = (context.data, context.fit);
     let columns = data.force_columns();

@@ -1,4 +1,4 @@
-//! What an effect may look at: the data, the model fitted so far, and what it leaves.
+//! The context of an effect: the data, the model fitted so far, and its residual.
 
 use super::made::{Made, OfModel};
 use super::{Candidate, Placed};
@@ -21,13 +21,13 @@ pub struct Context<'a> {
     pub data: &'a Data<'a>,
     /// The model.
     pub fit: &'a Fit,
-    /// What the model leaves on the data, by joint.
+    /// Residual of the model on the data, by joint.
     pub residual: &'a [Vec<f64>],
     /// The thresholds of the rule.
     pub rule: &'a Rule,
     /// The data's columns that were made already.
     made: Option<&'a Made>,
-    /// What is made of the model on the data, once it is asked for.
+    /// Columns of the model on the data, made at their first use.
     of_model: Arc<OfModel>,
 }
 
@@ -45,7 +45,7 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// As [`Context::new`], for columns alone: what the model leaves is not known.
+    /// Like [`Context::new`], for columns alone: the residual is not known.
     #[must_use]
     pub fn for_columns(data: &'a Data<'a>, fit: &'a Fit, rule: &'a Rule) -> Context<'a> {
         Context::new(data, fit, &[], rule)
@@ -230,8 +230,8 @@ const MOVED: f64 = 1e-4;
 /// A compliant joint's deflection is smoothed to this before it is differentiated twice, Hz: torques are
 /// noisy derivatives already.
 const STIFF: f64 = 5.0;
-/// As [`STIFF`], for a compliance as large as was found: above the frequency at which a soft arm swings on
-/// its gear the deflection is not what its load says.
+/// Like [`STIFF`], for a compliance as large as was found: above the frequency at which a soft arm swings on
+/// its gear the deflection does not follow its load.
 pub(crate) const SOFT: f64 = 2.0;
 /// A link that gives way far carries another load there: the load is computed this many times.
 pub(crate) const PASSES: usize = 2;

@@ -1,4 +1,4 @@
-//! What an effect must provide.
+//! The trait that every effect implements.
 
 use super::{Axis, Candidate, Context, Figures, Found, Window};
 use crate::rule::Rule;
@@ -12,11 +12,11 @@ use std::ops::Range;
 /// Effects of one class look alike: a wrong law of one is easily corrected by another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Class {
-    /// Of a joint's velocity and its history.
+    /// A function of a joint's velocity and its history.
     Friction,
-    /// Of the joints' positions.
+    /// A function of the joints' positions.
     Position,
-    /// Of the torque that the model itself predicts, or of its timing.
+    /// A function of the torque that the model itself predicts, or of its timing.
     Dynamics,
     /// During some time.
     Event,
@@ -38,7 +38,7 @@ impl Class {
 /// A law at a joint, and how much of the column's coefficient it has there.
 pub type Placed = (JointNumber, Law<f64>, f64);
 
-/// What an effect is in a model of the arm.
+/// The form of an effect in a model of the arm.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Part {
     /// Torques: its laws with their coefficients (see [`Effect::placed_laws`]).
@@ -68,11 +68,11 @@ pub trait Effect: Sync {
     /// The effect's name in results.
     fn name(&self) -> &'static str;
 
-    /// What it is easily confused with.
+    /// The class of effects with which it is easily confused.
     fn class(&self) -> Class;
 
-    /// Whether its name says what it is. What has none is looked for only where nothing with a name passes,
-    /// and is reported as a formula.
+    /// Whether it has a name. The search tries an effect without a name only if no named effect passes, and
+    /// reports it as a formula.
     fn has_name(&self) -> bool {
         true
     }
@@ -172,14 +172,16 @@ pub trait Effect: Sync {
         true
     }
 
-    /// A better candidate near an accepted one: columns that depend on estimates are taken anew from there.
+    /// A better candidate near an accepted one: columns that depend on estimates are computed again from
+    /// there.
     fn refined(&self, _candidate: &Candidate, _coefficients: &[f64]) -> Option<Candidate> {
         None
     }
 
     // What is reported about it once it is accepted.
 
-    /// When the context's logs have it: its windows, and where it goes on in logs that were not fitted.
+    /// The windows of the effect in the context's logs, and those in which it continues in logs that were not
+    /// fitted.
     fn windows(&self, _context: &Context<'_>, candidate: &Candidate) -> Vec<Window> {
         candidate.windows.clone()
     }

@@ -1,4 +1,4 @@
-//! A joint whose zero is off: the arm is not where the log says.
+//! A joint whose zero is wrong: the arm is not at the logged position.
 
 use super::words::Words;
 use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found, Part};
@@ -9,14 +9,14 @@ use std::ops::Range;
 /// τ = (τ_rigid(q − o) − τ_rigid(q))/o with coefficient o: logged position = true position + o.
 pub(super) struct EncoderOffset;
 
-/// Where the secant is taken.
+/// Settings of this effect: the point at which the secant is taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// The offset that the column is taken about, rad.
     pub about: f64,
 }
 
-/// What it is.
+/// Figures of this effect in a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// Logged less true position, rad.

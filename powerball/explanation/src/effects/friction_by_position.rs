@@ -14,14 +14,14 @@ use std::f64::consts::TAU;
 /// to its Coulomb friction.
 pub(super) struct FrictionByPosition;
 
-/// What is searched.
+/// Settings of this effect, which the search varies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// k, cycles a joint turn.
     pub order: f64,
 }
 
-/// What it is.
+/// Figures of this effect in a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// √(a² + b²), N·m.

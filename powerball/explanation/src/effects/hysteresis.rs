@@ -9,14 +9,14 @@ use serde::Serialize;
 /// τ = c·z with Dahl's state dz/dq = (1 − z·sign(q̇))·sign(q̇)/δ, c ≥ 0, δ in rad.
 pub(super) struct Hysteresis;
 
-/// What is searched.
+/// Settings of this effect, which the search varies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// δ: the distance over which friction winds up, rad.
     pub distance: f64,
 }
 
-/// What it is.
+/// Figures of this effect in a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// δ, rad.

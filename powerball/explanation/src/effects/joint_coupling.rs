@@ -1,5 +1,5 @@
-//! One joint's motion that loads another: shared bearings, cables, belts through a joint, and motors that
-//! turn with two joints.
+//! Motion of one joint that loads another one: shared bearings, cables, belts through a joint, and motors
+//! that turn with two joints.
 
 use super::candidate::scaled;
 use super::words::{Words, list, number};
@@ -29,7 +29,7 @@ pub struct Settings {
 /// How another joint's motion is felt.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Kind {
-    /// As cross-joint Coulomb friction.
+    /// Coupling by cross-joint Coulomb friction.
     Coulomb,
     /// In proportion to its velocity.
     Viscous,
@@ -40,7 +40,7 @@ pub enum Kind {
         /// γ₂ and γ₄ of the joint, where their levels are not zero, s/rad.
         steepness: Vec<f64>,
     },
-    /// As a motor that turns with both joints.
+    /// Coupling by a motor that turns with both joints.
     Transmission(Drive),
 }
 
@@ -78,7 +78,7 @@ const RATIOS: [f64; 2] = [1.0, -1.0];
 /// A motor whose viscous friction and rotor are felt, or one of them.
 const DRIVES: [(bool, bool); 3] = [(true, true), (false, true), (true, false)];
 
-/// What it is, one entry a pair of joints.
+/// Figures of this effect in a result, one entry per pair of joints.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// The coefficient of the law in SI units; of a friction its share in that of the other joint at that
@@ -249,7 +249,7 @@ fn from(candidate: &Candidate) -> Option<JointNumber> {
     Settings::of(candidate).map(|settings| settings.from)
 }
 
-/// The one number that stands for a coupling (see [`Figures::coefficient`]).
+/// The one number that describes a coupling (see [`Figures::coefficient`]).
 fn coefficient(context: &Context<'_>, from: JointNumber, kind: &Kind, coefficients: &[f64]) -> f64 {
     let Kind::Friction { steepness } = kind else { return coefficients[0] };
     let velocity = context.top_velocity(from);

@@ -1,4 +1,4 @@
-//! A joint that gives way under its torque: the link is not where the motor's encoder says.
+//! A joint that deflects under its torque: the link is not at the position of the motor's encoder.
 
 use super::words::Words;
 use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
@@ -9,7 +9,7 @@ use serde::Serialize;
 /// q_link = q − τ/K: the change of rigid torque on all joints over 1/K.
 pub(super) struct JointElasticity;
 
-/// Where the change of torque is taken.
+/// Settings of this effect: the point at which the change of torque is taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// The compliance 1/K that it is taken about, rad/(N·m); `None` while nothing is known of it, when the
@@ -17,7 +17,7 @@ pub struct Settings {
     pub about: Option<f64>,
 }
 
-/// What it is.
+/// Figures of this effect in a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// K, N·m/rad.

@@ -13,7 +13,7 @@ const MASS: usize = 3;
 /// … and the inertia across the direction of the first moment.
 pub(super) const INERTIA: usize = 4;
 
-/// What columns determine of a body.
+/// The parameters of a body that columns determine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Body {
     /// First moment about the link's joint in the link's frame, kg·m.

@@ -8,11 +8,11 @@ use serde::Serialize;
 /// τ = c·|τ_rigid|·tanh(γ·q̇), c ≥ 0 in N·m per N·m.
 pub(super) struct LoadFriction;
 
-/// It has no settings.
+/// Settings of this effect: it has none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings;
 
-/// What it is.
+/// Figures of this effect in a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// c, N·m of friction for each N·m of load.

@@ -1,4 +1,4 @@
-//! Columns of one data set that were made already: every step of a search asks for most of them again.
+//! Columns of one data set that were made already: every step of a search needs most of them again.
 
 use super::Candidate;
 use super::Settings;
@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::mem::{Discriminant, discriminant, size_of};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// What is kept at most of laws of the motion, bytes. What is made after that is made anew each time.
+/// Largest memory for columns of laws of the motion, bytes. Further columns are computed each time.
 const MOST: usize = 96 << 20;
 /// What is kept at most of one model, bytes.
 const MOST_OF_MODEL: usize = 32 << 20;
@@ -17,19 +17,19 @@ const MOST_OF_MODEL: usize = 32 << 20;
 /// tried next to it.
 const MODELS: usize = 3;
 
-/// What was made of one data set.
+/// The columns that were made of one data set.
 #[derive(Debug, Default)]
 pub(crate) struct Made {
     /// Columns of laws of the motion alone, by joint.
     pub(super) motion: ByLaw<JointNumber, Vec<f64>>,
-    /// Of laws that are the same on every joint: what passes a band, by recording and its cutoff, Hz.
+    /// Columns of laws that are the same on every joint, after a band's filter, by recording and cutoff, Hz.
     pub(super) passed: ByLaw<f64, Vec<Vec<f64>>>,
-    /// Of the last few models, the last one asked for at the end.
+    /// Columns of the last few models; the model that was used last is at the end.
     models: Mutex<Vec<Arc<OfModel>>>,
 }
 
 impl Made {
-    /// What was made of a model with these coefficients and friction steepnesses, empty where nothing was.
+    /// The columns of a model with these coefficients and friction steepnesses; empty if none were made.
     pub(super) fn of_model(&self, theta: &[f64], shapes: &[[f64; 2]]) -> Arc<OfModel> {
         let mut models = self.models.lock().unwrap_or_else(PoisonError::into_inner);
         let known = models.iter().position(|model| model.theta == theta && model.shapes == shapes);
@@ -87,7 +87,7 @@ impl OfModel {
         if let Some(columns) = known(&self.columns.lock().unwrap_or_else(PoisonError::into_inner)) {
             return columns;
         }
-        // Others go on while they are made.
+        // Other threads continue while they are made.
         let columns = make();
         let bytes: usize =
             columns.iter().flat_map(|c| &c.parts).map(|(_, v)| size_of::<f64>() * v.len()).sum();
@@ -140,7 +140,7 @@ impl<K: PartialEq, V: Size> ByLaw<K, V> {
         if let Some(values) = known(&self.made.lock().unwrap_or_else(PoisonError::into_inner)) {
             return values;
         }
-        // Others go on while it is made.
+        // Other threads continue while it is made.
         let values = Arc::new(make());
         let mut laws = self.made.lock().unwrap_or_else(PoisonError::into_inner);
         if laws.bytes + values.bytes() <= MOST && known(&laws).is_none() {

@@ -1,16 +1,17 @@
-//! What a torque model may lack: one file an effect, all behind one trait.
+//! The effects that a torque model may lack: one file for each effect, all behind one trait.
 //!
-//! **What an effect may know** is its [`Context`]: the logs as rows, the model fitted so far, what that
-//! model leaves, and the thresholds of the rule. It knows nothing of other effects, of the search or of
-//! results. What those must know of an effect they get from [`Effect`], never from its name.
+//! **The input of an effect** is its [`Context`]: the logs as rows, the model fitted so far, its residual,
+//! and the thresholds of the rule. An effect does not depend on other effects, on the search or on results.
+//! These use an effect through [`Effect`], never by its name.
 //!
 //! **How a log row becomes a column**: [`Effect::columns`] takes the logs of a context and gives, for each
 //! coefficient of a [`Candidate`], one value for each row of the regression. Where the effect is a torque of
 //! one joint, its [`Effect::laws`] are enough: the same laws run in a controller.
 //!
-//! **Adding an effect** means adding a file with three types: its `Settings` (what a search tries), its
-//! `Figures` (what a reader gets, as numbers and in words) and a unit struct that implements [`Effect`]; and naming that file
-//! below, once as a module and once in the list. The list is in the order in which equals are preferred.
+//! **Adding an effect** means adding a file with three types: its `Settings` (which a search varies), its
+//! `Figures` (the numbers and words of a result) and a unit struct that implements [`Effect`]; and naming
+//! that file below, once as a module and once in the list. The list is in the order in which equals are
+//! preferred.
 
 pub mod asymmetry;
 pub mod backlash;

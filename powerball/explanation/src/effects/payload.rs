@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// about its joint, mass and inertia, since often the first moment is all that shows.
 pub(super) struct Payload;
 
-/// What columns and windows depend on.
+/// Settings of this effect, on which its columns and windows depend.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// The centre of mass that the inertia is taken about, m in the last frame; `None` while nothing is known
@@ -31,7 +31,7 @@ pub struct Settings {
     pub link: Option<usize>,
 }
 
-/// What it is.
+/// Figures of this effect in a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// Centre of the body in the frame of its link, m; nothing where only its first moment shows.
@@ -49,7 +49,7 @@ pub struct Figures {
     /// link.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_moment: Option<[f64; 3]>,
-    /// The link that carries it, where it is not the last.
+    /// The link that carries the body, if it is not the last one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<JointNumber>,
     /// Mass of the body, kg; nothing where only its first moment shows.
@@ -332,7 +332,7 @@ fn long_enough(run: &Range<usize>, log: &Range<usize>, step: f64) -> bool {
 struct Search {
     /// Sums of all steps before each.
     before: Vec<Sums>,
-    /// The sums of what was found, and what it explains with which coefficients.
+    /// The sums of the candidate found, its coefficients, and the part that it explains.
     found: Sums,
     coefficients: Vec<f64>,
     explained: f64,

@@ -17,14 +17,14 @@ use std::f64::consts::TAU;
 /// k = 1 is left out: an arm's own weight turns that way.
 pub(crate) struct PositionRipple;
 
-/// What is searched.
+/// Settings of this effect, which the search varies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// k, cycles a joint turn.
     pub order: f64,
 }
 
-/// What it is, one entry a ripple.
+/// Figures of this effect in a result, one entry per ripple.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// N·m.
@@ -132,7 +132,7 @@ fn order(candidate: &Candidate) -> f64 {
     Settings::of(candidate).map_or(f64::NAN, |settings| settings.order)
 }
 
-/// Cycles of an order along a joint's travel: of less than one nobody can say that it repeats.
+/// Cycles of an order along a joint's travel: less than one cycle cannot show that it repeats.
 fn cycles(data: &Data<'_>, joint: JointNumber, order: f64) -> f64 {
     let positions = data.recordings.iter().flat_map(|r| r.position(joint.index()));
     let (low, high) = positions.fold((f64::MAX, f64::MIN), |(l, h): (f64, f64), q| (l.min(q), h.max(q)));
@@ -177,8 +177,8 @@ pub(crate) struct Spectrum {
 }
 
 impl Spectrum {
-    /// Of positions and torques, which are gone through twice; `None` where the positions hardly differ, or
-    /// by many turns.
+    /// Made from positions and torques, which are read twice; `None` if the positions hardly differ, or by
+    /// many turns.
     pub(crate) fn new<I: Iterator<Item = (f64, f64)>>(samples: impl Fn() -> I) -> Option<Spectrum> {
         let (low, high) = samples().fold((f64::MAX, f64::MIN), |(l, h), (q, _)| (l.min(q), h.max(q)));
         let width = TAU / BINS as f64;

@@ -8,11 +8,11 @@ use serde::Serialize;
 /// τ = k·(q − q_rest).
 pub(super) struct Spring;
 
-/// It has no settings.
+/// Settings of this effect: it has none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings;
 
-/// What it is.
+/// Figures of this effect in a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// The position at which it does not pull, rad.

@@ -9,14 +9,14 @@ use serde::Serialize;
 /// τ = c·tanh(γ·q̇)·exp(−(q̇/v_s)²), c ≥ 0.
 pub(super) struct Stribeck;
 
-/// What is searched.
+/// Settings of this effect, which the search varies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// v_s, rad/s.
     pub velocity: f64,
 }
 
-/// What it is.
+/// Figures of this effect in a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// c, N·m.

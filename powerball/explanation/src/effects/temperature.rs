@@ -11,16 +11,16 @@ use serde::Serialize;
 /// ϑ₀)/10 K; f is the whole friction or its viscous part.
 pub(super) struct Temperature;
 
-/// What of the friction changes, and with what.
+/// Settings of this effect: the part of friction that changes, and its cause.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// What changes.
+    /// The part of friction that changes.
     pub of: Friction,
-    /// With what.
+    /// The quantity with which it changes.
     pub with: Warmth,
 }
 
-/// What of a joint's friction changes.
+/// The part of a joint's friction that changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Friction {
     /// All of Eq. 16.
@@ -29,7 +29,7 @@ pub enum Friction {
     Viscous,
 }
 
-/// With what friction changes.
+/// The quantity with which friction changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Warmth {
     /// With the running time.
@@ -44,7 +44,7 @@ pub enum Warmth {
     },
 }
 
-/// What it is.
+/// Figures of this effect in a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// From cold to warm (or over 10 K), as a share of what the friction was when cold.

@@ -13,14 +13,14 @@ use std::ops::Range;
 /// A positive delay means that the logged torque is late.
 pub(super) struct TimeDelay;
 
-/// Where the shifted torque is taken.
+/// Settings of this effect: the point at which the shifted torque is taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// d, s.
     pub delay: f64,
 }
 
-/// What it is.
+/// Figures of this effect in a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// By how much the logged torque is late, s.

@@ -13,24 +13,24 @@ pub(super) struct TorqueConstant;
 /// How the factor changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// With which power of the torque.
+    /// The power of the torque with which the factor changes.
     pub kind: Kind,
     /// τ_max, N·m.
     pub scale: f64,
 }
 
-/// With which power of the torque the factor changes.
+/// The power of the torque with which the factor changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// It is another one throughout.
+    /// The factor has one other value throughout.
     Constant,
-    /// It changes with |τ|.
+    /// The factor changes with |τ|.
     Linear,
-    /// It changes with τ²: a motor that saturates.
+    /// The factor changes with τ²: a motor that saturates.
     Square,
 }
 
-/// What it is.
+/// Figures of this effect in a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// The change of the factor at [`torque`](Self::torque).

@@ -1,9 +1,9 @@
-//! A smooth torque of two joints that is no effect of the library: a formula in the place of a name.
+//! A smooth torque of two joints that is not an effect of the library: a formula in place of a name.
 //!
 //! A hose over two joints, a counterweight linkage, a cable that is wound up by two joints at once: there is
-//! no name for each, and names that fit a part of them are false. What such a thing adds is a smooth function
-//! of two positions, or of the joint's own velocity and another one's, and the first terms of its series
-//! describe it.
+//! no name for each, and names that fit a part of them are false. The torque of such a part is a smooth
+//! function of two positions, or of the joint's own velocity and another one's, and the first terms of its
+//! series describe it.
 
 use super::words::Words;
 use super::{Axis, Candidate, Class, Context, Effect, Found};
@@ -50,7 +50,7 @@ const SURFACE: [f64; 2] = [1.5, 3.0];
 /// a and b that are tried.
 const ORDERS: [[f64; 2]; 4] = [[1.0, 1.0], [1.0, 2.0], [2.0, 1.0], [2.0, 2.0]];
 
-/// What it is, one entry a law.
+/// Figures of this effect in a result, one entry per law.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// The formulas.
@@ -70,7 +70,7 @@ impl Figures {
 pub struct Formula {
     /// The joint that feels it.
     pub joint: JointNumber,
-    /// As text: `tau2 = c1·q2·q3 + …`, N·m.
+    /// The law as text: `tau2 = c1·q2·q3 + …`, N·m.
     pub formula: String,
     /// The formula for LaTeX.
     pub latex: String,

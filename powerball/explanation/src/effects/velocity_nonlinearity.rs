@@ -8,14 +8,14 @@ use serde::Serialize;
 /// τ = c·q̇|q̇|, c·q̇³ or c·sign(q̇)·√|q̇|.
 pub(super) struct VelocityNonlinearity;
 
-/// What is searched.
+/// Settings of this effect, which the search varies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// The power of q̇.
     pub power: f64,
 }
 
-/// What it is, by joint.
+/// Figures of this effect in a result, by joint.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// c, N·m for 1 rad/s.

@@ -1,6 +1,6 @@
 //! Windows of logs: which rows are in them, and steps of time of which they are made.
 //!
-//! Also here: cross products of a few columns with the base by stretch of time.
+//! The module also has the cross products of a few columns with the base, by stretch of time.
 
 use super::{Context, Window};
 use faer::Mat;
@@ -55,8 +55,8 @@ pub(super) fn window(
     Some(Window::new(data, steps[found.start].log, from, to))
 }
 
-/// As [`window`], for what is there before a log begins where it is there at its first step, and goes on
-/// after it where it is there at its last.
+/// Like [`window`], for an effect that is present before a log begins if it is present at its first step, and
+/// continues after it if it is present at its last step.
 pub(super) fn lasting_window(
     context: &Context<'_>,
     steps: &[Block],
@@ -85,7 +85,7 @@ pub(super) fn best_run(explains: &[(f64, f64)]) -> Range<usize> {
     best.1
 }
 
-/// Where no joint moves for as long as `rest`, s, before the arm sets off.
+/// The stretches in which no joint moves for at least `rest`, s, before the arm starts.
 pub(super) fn rests(context: &Context<'_>, steps: &[Block], rest: f64) -> Vec<Window> {
     let mut before: Option<&Block> = None;
     let of = |step| {

@@ -1,11 +1,11 @@
-//! Which of two models old and new logs speak for.
+//! The decision between two models by old and new logs.
 //!
 //! Both are fitted to all logs that may be fitted. Block by block the χ² of the one is taken from that of the
 //! other; blocks count as independent, so their sum has an honest error whatever colour the residual has
 //! (Vuong, Likelihood ratio tests for model selection and non-nested hypotheses, Econometrica 1989, with
 //! blocks in the place of samples).
 //!
-//! Also here: the log of an experiment together with the earlier ones.
+//! The module also joins the log of an experiment with the earlier ones.
 
 use crate::explain::{Hypothesis, Open};
 use crate::options::{ExplainError, ExplainOptions};
@@ -14,7 +14,7 @@ use powerball_identification::estimate::distribution::f_tail;
 use powerball_logs::log::Log;
 use powerball_logs::regression::{Data, RigidArm, Signals};
 
-/// What was decided.
+/// The decision.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decision {
     /// The name that is right; `None` where these logs cannot say.
@@ -23,7 +23,7 @@ pub struct Decision {
     pub why: String,
     /// χ² by which the better one leads on the fitted logs, after a penalty for coefficients.
     pub evidence: f64,
-    /// Probability of such a lead by chance.
+    /// Probability of so large a lead by chance.
     pub p_value: f64,
     /// χ² by which it leads on the held-out logs.
     pub held_out: f64,
@@ -146,7 +146,7 @@ fn difference(data: &Data<'_>, a: &Hypothesis, b: &Hypothesis) -> f64 {
 pub const HELD_OUT: f64 = 0.35;
 /// Between what is fitted and what is held out, s.
 const GAP: f64 = 0.5;
-/// From the end of the last log to the new one, where nobody knows better, s.
+/// Assumed pause between the end of the last log and the new one, s.
 const PAUSE: f64 = 5.0;
 
 /// Splits a new log into what may be fitted and what is held out, and puts it behind all others: on their

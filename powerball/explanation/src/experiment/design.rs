@@ -4,7 +4,8 @@
 //!
 //! Each open name has a model, fitted to the old logs. Were one of them true, the other one, fitted again to
 //! old and new logs together, would absorb a part of the difference: inertia, friction and its own
-//! coefficients move. What it cannot absorb, over the noise, is what an experiment along the path would show.
+//! coefficients move. The part that it cannot absorb, relative to the noise, is the signal of an experiment
+//! along the path.
 
 use crate::explain::{Hypothesis, Open};
 use faer::Mat;
@@ -18,7 +19,7 @@ use powerball_logs::vector::dot;
 /// A designed experiment.
 #[derive(Clone, Debug)]
 pub struct DesignedExperiment {
-    /// What the arm is to follow, from rest to rest.
+    /// The path that the arm is to follow, from rest to rest.
     pub motion: Motion,
     /// rms of the difference that would stay, over the residual's own rms, by joint.
     pub expected: Vec<f64>,
@@ -77,8 +78,8 @@ struct Duel<'o> {
     model: &'o Hypothesis,
     /// The rival's normal equations on the old logs.
     gram: Mat<f64>,
-    /// What the truth has and the rival may not absorb: the difference of both models, then each of the
-    /// truth's own columns.
+    /// Signals of the true model that the rival may not absorb: the difference of both models, then each of
+    /// the true model's own columns.
     signals: Vec<Signal>,
 }
 

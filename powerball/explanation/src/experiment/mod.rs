@@ -1,7 +1,8 @@
-//! Experiments that tell names apart which logs leave open: designed, recorded, judged.
+//! Experiments that distinguish the names that logs leave open: designed, recorded, judged.
 //!
-//! `design` searches the path along which the open names predict torques that differ most, `decide` asks old
-//! and new logs which of them is right, and [`learn`] explains everything again without what was ruled out.
+//! `design` searches the path along which the open names predict torques that differ most, `decide` tests on
+//! old and new logs which of them is right, and [`learn`] explains everything again without what was ruled
+//! out.
 
 mod decide;
 mod design;
@@ -63,13 +64,12 @@ fn advice(open: &Open, design: &DesignedExperiment, visible: f64) -> String {
     }
 }
 
-/// What is learnt from the log of an experiment: which of the open names is right, and the explanation of
-/// everything again.
+/// Uses the log of an experiment: decides which of the open names is right, and explains all logs again.
 ///
 /// The last part of the new log takes no part in any fit.
 ///
 /// # Errors
-/// As [`explain_body`].
+/// The errors of [`explain_body`].
 pub fn learn(
     body: &RigidArm,
     (fit, held_out): (&[Log], &[Log]),

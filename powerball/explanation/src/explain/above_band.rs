@@ -1,8 +1,8 @@
 //! Ripple that is too fast for the band of the regression.
 //!
 //! Teeth that pass at 30 Hz leave nothing in a band of 10 Hz, in which inertia is identified: above it
-//! accelerations are noise. A ripple needs none. What the model leaves above the band is summed by order, and
-//! the highest peak of all joints is held against those of time-shift surrogates, in which the same torque is
+//! accelerations are noise. A ripple needs none. The residual above the band is summed by order, and the
+//! highest peak of all joints is compared with those of time-shift surrogates, in which the same torque is
 //! seen at other positions: the single-step test of Westfall and Young (1993) at one level for all joints and
 //! orders. It must then lower the error above the band on the validation set, with the same phase.
 
@@ -55,7 +55,7 @@ pub(crate) fn ripple_above_band(study: &Study<'_>, model: &mut Model, number: us
 /// A ripple that passed.
 struct Ripple {
     candidate: Candidate,
-    /// Of its cosine and sine, N·m.
+    /// Coefficients of its cosine and sine, N·m.
     coefficients: Vec<f64>,
     p_value: f64,
     gain: f64,
@@ -150,7 +150,7 @@ fn raises_error(study: &Study<'_>, model: &Model, ripple: &Ripple) -> bool {
 pub(super) struct Trace {
     /// By sample: position, and velocity's size; none where the sample does not count.
     motion: Vec<Option<(f64, f64)>>,
-    /// What the model leaves above the band, passed twice through the high-pass: the filter is symmetric in
+    /// The residual above the band, passed twice through the high-pass: the filter is symmetric in
     /// time, so the product of this with any signal is that of both high-passed.
     pub(super) twice: Vec<f64>,
     /// Squared error above the band over samples that count, (N·m)².
@@ -343,7 +343,7 @@ pub(super) fn heights_by_chance(joints: &[Vec<Trace>], count: usize) -> Vec<f64>
 /// A ripple of an order, as a joint's traces have it.
 pub(super) struct Wave {
     order: f64,
-    /// Of cos(k·q) and sin(k·q), N·m.
+    /// Coefficients of cos(k·q) and sin(k·q), N·m.
     pub(super) coefficients: [f64; 2],
 }
 
@@ -360,7 +360,7 @@ impl Wave {
         if square > 0.0 { (2.0 * self.product(traces) - own) / square } else { 0.0 }
     }
 
-    /// As [`Self::gain`], where other logs have it with the same phase: more than noise gives with
+    /// Like [`Self::gain`], if other logs have the ripple with the same phase: more than noise gives with
     /// probability `level`.
     pub(super) fn gain_on(&self, traces: &[Trace], level: f64) -> Option<f64> {
         let above = Velocities::of(traces).above(traces, self.order);

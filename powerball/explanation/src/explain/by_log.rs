@@ -1,7 +1,7 @@
-//! What is another in one log than in the others: friction, a zero, a gain, a delay.
+//! Differences of one log from the others: friction, a zero, a gain, a delay.
 //!
-//! All logs, fitted or for validation, are taken under one model. What all of them share falls out: a model
-//! that is equally wrong in all of them makes none odd.
+//! All logs, fitted or for validation, are taken under one model. Errors that all logs share cancel: a model
+//! that is equally wrong in all of them makes none of them different.
 
 use super::model::Model;
 use super::study::Study;
@@ -138,9 +138,9 @@ fn friction(context: &Context<'_>, model: &Model, joint: JointNumber) -> Column 
     Column::on(j, std::mem::take(&mut friction[j]))
 }
 
-/// The share of what the squared error of some joints is larger in a log than in any other one that goes with a column;
-/// `None` where it is not `odd_log` times as large. Logs of other paths are predicted more or less well, and what fits
-/// best in one of them only resembles that.
+/// The share of what the squared error of some joints is larger in a log than in any other one that goes with
+/// a column; `None` where it is not `odd_log` times as large. Logs of other paths are predicted more or less
+/// well, and the best fit in one of them only resembles that.
 fn share(
     together: &Together<'_>,
     own: (usize, usize),
@@ -191,7 +191,7 @@ pub(crate) const SIDES: usize = 2;
 /// The model of all logs.
 pub(crate) struct Together<'s> {
     pub(crate) data: [&'s Data<'s>; SIDES],
-    /// What it leaves, by side, joint and row, N·m.
+    /// Residual of the model, by side, joint and row, N·m.
     pub(crate) residual: [Signals; SIDES],
     /// The model's coefficients.
     pub(crate) theta: Vec<f64>,
@@ -200,7 +200,7 @@ pub(crate) struct Together<'s> {
     weights: Vec<f64>,
 }
 
-/// What a column of one log explains in addition to the model.
+/// The part of a log's residual that a column of this log explains in addition to the model.
 pub(crate) struct Asked {
     /// The column's coefficient.
     pub(crate) theta: f64,
@@ -254,7 +254,7 @@ impl<'s> Together<'s> {
         self.solve(side, log, column).map(|(theta, gain, _)| (theta, gain))
     }
 
-    /// As [`Self::screen`], with the column itself.
+    /// Like [`Self::screen`], with the column itself.
     pub(crate) fn ask(&self, side: usize, log: usize, column: &Column) -> Option<Asked> {
         let (theta, gain, base) = self.solve(side, log, column)?;
         let mut freed: [Signals; SIDES] = [0, 1].map(|s: usize| {

@@ -1,4 +1,4 @@
-//! What was found, from which the result is made.
+//! The findings from which the result is made.
 
 use super::comparison::History;
 use super::model::Model;
@@ -12,11 +12,11 @@ use std::collections::BTreeSet;
 /// Everything that the result says something of.
 pub(super) struct Findings<'a> {
     pub(super) study: Study<'a>,
-    /// What was known before the search.
+    /// The fit before the search.
     pub(super) initial_fit: InitialFit,
-    /// What the search accepted.
+    /// The model with the accepted effects.
     pub(super) model: Model,
-    /// What its steps decided.
+    /// The decisions of the steps.
     pub(super) history: History,
     /// How often it is wrong on these data.
     pub(super) false_positives: FalsePositives,
@@ -29,10 +29,10 @@ impl<'a> Findings<'a> {
         if better { other } else { self }
     }
 
-    /// These findings where what they took out of the validation set is needed there, else those of the set as it was
-    /// logged. A base model that lacks something is wrong on a path of its own as if a body were there or a
-    /// hand pushed; once that something is in the model no body is needed. What is needed leaves little of
-    /// the error that the other model has more than on its fitted logs.
+    /// These findings if the effects that they removed from the validation set are needed there, else those
+    /// of the set as logged. An incomplete base model has errors on a new path that look like a body or a
+    /// pushing hand; once the missing effect is in the model, no body is needed. A needed effect removes most
+    /// of the error that the other model has beyond that on its fitted logs.
     pub(super) fn or_as_logged(self, logged: Findings<'a>) -> Findings<'a> {
         let sigma = &logged.model.fit.sigma;
         let joints: BTreeSet<usize> = self

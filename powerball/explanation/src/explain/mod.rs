@@ -1,22 +1,22 @@
-//! From what a base model leaves to named effects: the pipeline.
+//! The pipeline from the residual of a base model to named effects.
 //!
-//! [`explain_body`] is the whole of it. `prepare` makes rows of the logs and fits the base model; the loop of
+//! [`explain_body`] runs all of it. `prepare` makes rows of the logs and fits the base model; the loop of
 //! `find` proposes one effect after the other (`step`) until nothing passes and nothing is taken back;
 //! `results` makes the model and the report of the `findings`. Each uses what stands above it here, never
 //! what stands below:
 //!
 //! | | |
 //! |---|---|
-//! | `study` | the rows and the options: what does not change while effects are looked for |
-//! | `model` | what was accepted, and the fit with it: what does |
-//! | `named` | what is reported about an effect |
+//! | `study` | the rows and the options: what does not change during the search |
+//! | `model` | the accepted effects, and the fit with them: what changes |
+//! | `named` | the report on an effect |
 //! | `search` | candidates screened and tested; settings refined; backward elimination |
 //! | `comparison` | **whether a name is given**, what stays open, what is taken back |
 //! | `above_band` | ripple that is too fast for the band of the fit, by a test of its own |
-//! | `special` | what is special of some logs: one path, another running time, something held |
-//! | `by_log` | what is another in one log than in the others |
-//! | `prepare`, `step` | the base model, what the search begins with, and one step of the loop |
-//! | `findings`, `results` | what was found; the model, the report and its figures |
+//! | `special` | special properties of some logs: one path, another running time, a held body |
+//! | `by_log` | differences of one log from the others |
+//! | `prepare`, `step` | the base model, with which the search begins, and one step of the loop |
+//! | `findings`, `results` | the findings; the model, the report and its figures |
 
 mod above_band;
 mod by_log;

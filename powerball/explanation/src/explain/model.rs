@@ -1,4 +1,4 @@
-//! The base model with what was accepted: what a step changes.
+//! The base model with the accepted effects, which every step changes.
 
 use super::study::Study;
 use crate::effects::{self, Candidate, Context, Effect, Made};
@@ -34,7 +34,7 @@ pub(super) enum Origin {
 /// The model in the making.
 #[derive(Debug)]
 pub(super) struct Model {
-    /// What was accepted, in the order of its columns.
+    /// The accepted effects, in the order of their columns.
     pub(super) accepted: Vec<Accepted>,
     /// Accepted once and taken out again, or no better than chance: not tried again.
     pub(super) given_up: Vec<Candidate>,
@@ -105,7 +105,7 @@ impl Model {
         Model { accepted: Vec::new(), given_up: Vec::new(), fit: base, harmful: OnceLock::new() }
     }
 
-    /// The base model with what every arm may have (see [`Effect::baseline`]). Its friction is looked for anew.
+    /// The base model with what every arm may have (see [`Effect::baseline`]). Its friction is fitted again.
     pub(super) fn baseline(&self, study: &Study<'_>) -> Model {
         let context = self.context(study);
         let mut terms: Vec<Term> = Vec::new();
@@ -187,7 +187,7 @@ impl Model {
         self.accepted.iter().zip(self.places()).map(of).collect()
     }
 
-    /// Standard errors of the fit's columns by their place; none of a column that is not free.
+    /// Standard errors of the fit's columns by their place; `None` for a column that is not free.
     pub(super) fn errors(&self) -> impl Fn(usize) -> Option<f64> {
         let variances = self.fit.solver().inverse_diagonal();
         move |column| variances.get(column).filter(|v| v.is_finite()).map(|v| v.max(0.0).sqrt())
@@ -279,8 +279,8 @@ fn take_above_band_out(a: &Accepted, columns: &[Column], residual: &mut Signals)
     residual.subtract(columns, a.above_band().unwrap_or_default());
 }
 
-/// Fits the base model with some candidates; columns that depend on estimates are taken anew, twice. `made` has columns
-/// of the data that were made already.
+/// Fits the base model with some candidates; columns that depend on estimates are computed again, twice.
+/// `made` has columns of the data that were made already.
 pub(super) fn refitted(
     data: &Data<'_>,
     folds: &Folds,

@@ -1,4 +1,4 @@
-//! What is reported about an effect.
+//! The report on one effect.
 
 use crate::effects::Figures;
 use crate::effects::words::Words;
@@ -46,7 +46,7 @@ pub struct NamedEffect {
     pub leftover: f64,
     /// The least share of its squared torque, over its joints, that no other column of the fit can take over.
     pub own_share: f64,
-    /// What it is of: see `rivals` where another name fits as well.
+    /// Class of the effect; see `rivals` if another name fits as well.
     pub class: String,
     /// Names that were considered for the same residual.
     pub rivals: Vec<Rival>,

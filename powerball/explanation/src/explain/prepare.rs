@@ -1,6 +1,6 @@
 //! From logs to the base model that the search begins with.
 //!
-//! Also here: the model that the search begins with.
+//! [`Prepared`] is the model that the search begins with.
 
 use super::model::Model;
 use super::named::FitErrors;
@@ -32,7 +32,7 @@ pub(super) enum ValidationOnly {
     Kept,
 }
 
-/// What is known before anything is looked for.
+/// The data and the model before the search.
 pub(super) struct Prepared<'a> {
     pub(super) study: Study<'a>,
     /// The base model.
@@ -40,13 +40,13 @@ pub(super) struct Prepared<'a> {
     pub(super) initial_fit: InitialFit,
 }
 
-/// What the result reports about the time before the search.
+/// The report on the fit before the search.
 pub(super) struct InitialFit {
     /// Errors of the base model.
     pub(super) errors: FitErrors,
-    /// What the base model leaves on the validation set, by joint and row, N·m.
+    /// Residual of the base model on the validation set, by joint and row, N·m.
     pub(super) residual: Signals,
-    /// What is in logs of the validation set only; its torque is taken out of them.
+    /// Effects in logs of the validation set only; their torque is removed from these logs.
     pub(super) validation_only: Vec<ValidationOnlyEffect>,
     /// When the logs are taken to have been recorded.
     pub(super) clock: Clock,

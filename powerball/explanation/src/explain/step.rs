@@ -13,7 +13,7 @@ use powerball_controller::JointNumber;
 use powerball_identification::estimate::{Design, friction_columns, residual_stats};
 use std::sync::OnceLock;
 
-/// What a step found, before anything is changed.
+/// The proposal of a step, before the model is changed.
 pub(super) struct Proposed {
     /// Effects of which nothing passed, and why.
     pub(super) refused: Vec<Rival>,
@@ -24,7 +24,7 @@ pub(super) struct Proposed {
 pub(super) enum Outcome {
     /// A group passed.
     Named(Box<Choice>),
-    /// What fitted best scored no more than surrogates do.
+    /// The best candidate scored no more than surrogates.
     Chance(Vec<Candidate>),
     /// Nothing passed; names that fit a part may be open.
     Nothing,
@@ -153,7 +153,7 @@ fn above_chance(screen: &Screen<'_>, group: &Group, number: usize) -> Vec<usize>
     (0..group.members.len()).filter(|m| above(&group.members[*m])).collect()
 }
 
-/// Takes a choice into the model: everything is refitted, and what it made unneeded goes out.
+/// Adds a choice to the model: everything is refitted, and effects that it made unnecessary are removed.
 pub(super) fn accept(study: &Study<'_>, model: &mut Model, choice: Choice, number: usize) -> Step {
     let Choice { effect, members, comparison, question, tested, before } = choice;
     let square_before = model.fit.residual.squares();
@@ -224,7 +224,7 @@ fn drop_words_for(study: &Study<'_>, model: &mut Model, number: usize) {
     }
 }
 
-/// As [`drop_words_for`], for all laws, once their settings are what fits best.
+/// Like [`drop_words_for`], for all laws, once their settings fit best.
 pub(super) fn drop_words(study: &Study<'_>, model: &mut Model) {
     let law = |a: &Accepted| a.step().filter(|_| !a.effect().has_name());
     let steps: Vec<usize> = model.accepted.iter().filter_map(law).collect();
@@ -234,8 +234,8 @@ pub(super) fn drop_words(study: &Study<'_>, model: &mut Model) {
     }
 }
 
-/// Once everything else is known: what was in the model from the start goes out where it is not needed and
-/// gets its name where it is. Returns the step of each name.
+/// Called once everything else is known: effects that were in the model from the start are removed if they
+/// are not needed, and get a name if they are. Returns the step of each name.
 pub(super) fn judge_baseline(study: &Study<'_>, model: &mut Model) -> Vec<Step> {
     keep_needed(study, model);
     let mut effects: Vec<&'static dyn Effect> = Vec::new();

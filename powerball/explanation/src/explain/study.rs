@@ -1,4 +1,4 @@
-//! What does not change while effects are looked for.
+//! The data and options that do not change during the search.
 
 use crate::effects::{Context, Made};
 use crate::options::ExplainOptions;
@@ -20,7 +20,7 @@ pub(super) struct Study<'a> {
     pub(super) folds: Folds,
     /// Whether the validation set repeats the path of the fitted logs.
     pub(super) one_path: bool,
-    /// What the search was given in addition to the logs.
+    /// The options of the search.
     pub(super) options: &'a ExplainOptions<'a>,
 }
 

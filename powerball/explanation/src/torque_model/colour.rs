@@ -1,4 +1,4 @@
-//! The colour of what a model leaves, and how large its error is: what a watch measures changes against.
+//! The colour of a model's residual, and the size of its error: a watch compares changes with both.
 
 use super::rows::{Rows, Shown};
 use super::{Detector, TorqueModel};
@@ -9,7 +9,7 @@ use powerball_logs::regression::{DataOptions, Recording, RigidArm};
 use powerball_logs::signal::resample::median_step;
 use serde::{Deserialize, Serialize};
 
-/// A joint with fewer rows says nothing of its colour.
+/// Least number of rows from which a joint's colour is learnt.
 const FEWEST: usize = 200;
 /// The margin is such that no test on the logs it was learnt from comes nearer to an alarm than the level to the power
 /// of this.
@@ -23,7 +23,7 @@ const STEPS: usize = 8;
 /// Joints together may need margins up to this many times as large as each by itself.
 const TOGETHER: f64 = 4.0;
 
-/// What a model leaves on logs on which it holds.
+/// The residual of a model on logs on which it holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Colour {
     /// Samples a second of the logs.
@@ -68,7 +68,7 @@ impl JointColour {
         own
     }
 
-    /// As the test of a controller takes it.
+    /// The colour in the form of the controller's test.
     #[must_use]
     pub fn for_test(&self) -> change::Colour<f64> {
         change::Colour { coefficients: self.coefficients, deviation: self.deviation, margin: self.margin }
@@ -76,8 +76,9 @@ impl JointColour {
 }
 
 impl Colour {
-    /// What a model leaves on logs: `body` is the arm with the model's changes. The mean time to a false alarm is
-    /// `level` rows, and friction may wander by ± `range` of itself. `None` where there is nothing to learn from.
+    /// Learns the residual of a model from logs: `body` is the arm with the model's changes. The mean time to
+    /// a false alarm is `level` rows, and friction may wander by ± `range` of itself. `None` where there is
+    /// nothing to learn from.
     #[must_use]
     pub fn learn(
         model: &TorqueModel,
@@ -104,7 +105,7 @@ impl Colour {
         Colour::of_rows(&rows, 1.0 / step, level, range)
     }
 
-    /// As [`Colour::learn`], from rows of logs with `rate` samples a second.
+    /// Like [`Colour::learn`], from rows of logs with `rate` samples a second.
     #[must_use]
     pub fn of_rows(rows: &[Rows], rate: f64, level: f64, range: f64) -> Option<Colour> {
         let dof = rows.first()?.joints.len();

@@ -201,10 +201,10 @@ impl TorqueModel {
         TorqueModel::parse(&read_text(path)?, path)
     }
 
-    /// As [`TorqueModel::read`], from the text of a file; `path` is its name in errors.
+    /// Like [`TorqueModel::read`], from the text of a file; `path` is its name in errors.
     ///
     /// # Errors
-    /// [`FileError`] where it is no model.
+    /// [`FileError`] if it is not a model.
     pub fn parse(text: &str, path: &Path) -> Result<TorqueModel, FileError> {
         let wrong = |what: String| FileError(format!("{}: {what}", path.display()));
         let json: Value = serde_json::from_str(text).map_err(|e| wrong(format!("is no JSON: {e}")))?;

@@ -1,7 +1,8 @@
-//! The next identification: what is known is taken out of the logs, and what is found comes to it.
+//! The next identification: the known torque is subtracted from the logs, and new effects are added to the
+//! model.
 //!
-//! Also here: a model of an arm as what the next identification or verification knows; the arm of the file as a model
-//! has it.
+//! The module also makes the known model for the next identification or verification, and applies a model's
+//! changes to the arm of the file.
 
 use super::file::read_text;
 use super::{Additions, ArmChanges, FileError, LogChanges, NamedTerm, TorqueModel};
@@ -63,7 +64,7 @@ impl TorqueModel {
 }
 
 impl Additions {
-    /// What was known together with what was then found on logs from which it had been taken out.
+    /// Adds the effects that were found on logs without the known torque to the known ones.
     #[must_use]
     pub fn and(&self, found: &Additions) -> Additions {
         let mut known = self.clone();
@@ -85,7 +86,7 @@ impl Additions {
         let moved = |NamedTerm { effect, term, std }: NamedTerm| {
             let parts = at_true_position(&term, joint.index(), offset).into_iter();
             parts.map(move |part| {
-                // What is turned into two terms shares an error that none of them has alone.
+                // A term that becomes two terms shares an error that neither has alone.
                 let std = std.filter(|_| part == term);
                 NamedTerm { effect: effect.clone(), term: part, std }
             })
@@ -208,10 +209,10 @@ impl ModelFile {
         ModelFile::parse(&read_text(file)?, file)
     }
 
-    /// As [`ModelFile::read`], from the text of a file; `file` is its name in errors.
+    /// Like [`ModelFile::read`], from the text of a file; `file` is its name in errors.
     ///
     /// # Errors
-    /// As [`TorqueModel::parse`].
+    /// The errors of [`TorqueModel::parse`].
     pub fn parse(text: &str, file: &Path) -> Result<ModelFile, FileError> {
         let model = TorqueModel::parse(text, file)?;
         Ok(ModelFile { model, file: file.to_path_buf() })
@@ -258,7 +259,7 @@ impl KnownModel for ModelFile {
 /// Why an arm cannot be changed as a model says.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unchanged {
-    /// A name that is none of the arm's parameters.
+    /// A name that is not one of the arm's parameters.
     #[error("arm_changes.not_zero: '{0}' is no parameter of this arm")]
     NoParameter(String),
     /// Gravity that is no number.
@@ -267,10 +268,10 @@ pub enum Unchanged {
 }
 
 impl ArmChanges {
-    /// The arm as it is.
+    /// The arm with the changes of the model.
     ///
     /// # Errors
-    /// [`Unchanged`] where the changes are another arm's.
+    /// [`Unchanged`] if the changes are those of another arm.
     pub fn of(&self, arm: &Arm) -> Result<Arm, Unchanged> {
         let mut arm = arm.clone();
         if let Some(gravity) = self.gravity {

@@ -1,8 +1,8 @@
-//! A torque model of an arm with all that is known of it: `identify` and `explain` write it, `verify` judges
+//! A torque model of an arm with all its effects: `identify` and `explain` write it, `verify` judges
 //! it, `generate` makes a controller's code of it, and the next identification begins with it.
 //!
-//! τ = rigid(q, q̇, q̈) + Eq. 16 friction + the terms of [`powerball_controller::correction`], in the units of
-//! the logs, at true positions: an encoder's offset is taken off first.
+//! τ = rigid(q, q̇, q̈) + Eq. 16 friction + the terms of [`powerball_controller::correction`], in the units
+//! of the logs, at true positions: an encoder's offset is subtracted first.
 
 mod c_api;
 mod colour;
@@ -51,29 +51,29 @@ pub struct TorqueModel {
     /// The end of each joint's band, Hz, in which it was fitted and judged; none where that is not known.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joint_bands: Vec<f64>,
-    /// What goes beyond these.
+    /// The effects beyond the rigid arm and its friction.
     #[serde(flatten)]
     pub additions: Additions,
-    /// What it leaves where it holds, for `powerball watch`.
+    /// Colour of its residual while it holds, for `powerball watch`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub colour: Option<Colour>,
 }
 
-/// What an explanation adds to a base model.
+/// The additions of an explanation to a base model.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Additions {
     /// Torques beyond rigid arm and friction.
     pub terms: Vec<NamedTerm>,
-    /// What is otherwise than the arm file says.
+    /// Differences of the arm from its file.
     pub arm_changes: ArmChanges,
-    /// What is wrong with the logs rather than with the arm.
+    /// Errors of the logs, not of the arm.
     pub log_changes: LogChanges,
     /// Bodies that the last link held in some logs: no part of the bare arm.
     pub payloads: Vec<Payload>,
 }
 
-/// A term with the effect that it stands for.
+/// A term with the name of its effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "file::TermEntry", into = "file::TermEntry")]
 pub struct NamedTerm {
@@ -85,7 +85,7 @@ pub struct NamedTerm {
     pub std: Option<f64>,
 }
 
-/// Where the arm is not as its file says.
+/// Differences of the arm from its file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ArmChanges {
@@ -95,7 +95,7 @@ pub struct ArmChanges {
     pub not_zero: Vec<String>,
 }
 
-/// Where logs are not what the arm did; one entry a joint, or none.
+/// Errors of the logs; one entry per joint, or none.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct LogChanges {
@@ -125,7 +125,7 @@ pub struct Payload {
 }
 
 impl Payload {
-    /// What it adds to its link: m mx my mz Ixx Ixy Ixz Iyy Iyz Izz.
+    /// The parameters that it adds to its link: m mx my mz Ixx Ixy Ixz Iyy Iyz Izz.
     #[must_use]
     pub fn parameters(&self) -> [f64; 10] {
         let (m, [x, y, z]) = (self.mass, self.com);
@@ -174,8 +174,8 @@ impl TorqueModel {
     }
 
     /// The model in the minimal set of a body, whose parameters its own determine: those that logs of several
-    /// mountings determine together, say. Errors of converted values are not known. As it is where they do
-    /// not.
+    /// mountings determine together, say. Errors of converted values are not known. If the parameters do not
+    /// determine it, the model is unchanged.
     #[must_use]
     pub fn in_set_of(mut self, body: &RigidArm) -> TorqueModel {
         if let Some(parameters) = in_set_of(&self.parameters, &self.arm, body) {
@@ -267,7 +267,7 @@ impl TorqueModel {
         torque
     }
 
-    /// The torque of the rigid arm and what it holds.
+    /// The torque of the rigid arm with its payload.
     fn rigid(
         &self,
         body: &RigidArm,

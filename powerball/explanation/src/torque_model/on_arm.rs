@@ -1,4 +1,4 @@
-//! A model together with the arm that it is of, as control laws and simulations take it.
+//! A model together with its arm, for control laws and simulations.
 
 use super::{ModelFile, TorqueModel};
 use dyngen::Arm;
@@ -13,7 +13,7 @@ pub struct ModelOnArm<const N: usize> {
     pub body: RigidArm,
     /// The model.
     pub model: TorqueModel,
-    /// The rigid arm and what it holds, for control laws.
+    /// The rigid arm with its payload, for control laws.
     pub numeric: NumericArm<N>,
 }
 

@@ -1,4 +1,4 @@
-//! The torque of a motion that is planned and not logged yet: what a controller feeds forward.
+//! The torque of a planned motion: the feed-forward torque of a controller.
 
 use super::{Additions, ArmChanges, LogChanges, Payload, TorqueModel};
 use dyngen::SetKind;
@@ -16,13 +16,14 @@ pub struct PlannedTorque {
     pub rigid: Vec<f64>,
     /// Eq. 16.
     pub friction: Vec<f64>,
-    /// What goes beyond both.
+    /// Torque of the effects, in addition to the rigid arm and friction.
     pub effects: Vec<f64>,
 }
 
 impl TorqueModel {
-    /// What a motion takes that begins `running` s after the arm began to work, as cold as when it was recorded. `body` is the
-    /// arm with the model's changes. A delay of logs is no part of it; terms of a measured temperature count as 0.
+    /// The torque of a motion that begins `running` s after the arm began to work, as cold as when it was
+    /// recorded. `body` is the arm with the model's changes. A delay of logs is not included; terms of a
+    /// measured temperature count as 0.
     #[must_use]
     pub fn planned(&self, body: &RigidArm, motion: &Motion, running: f64) -> PlannedTorque {
         let recording = Recording {
@@ -103,8 +104,8 @@ impl TorqueModel {
         base
     }
 
-    /// The terms that depend on positions alone, constant torques among them: what an arm that a hand guides is held
-    /// against in addition to its weight.
+    /// The terms that depend on positions alone, constant torques among them: a hand-guided arm is
+    /// compensated for them in addition to its weight.
     #[must_use]
     pub fn holding_terms(&self) -> Vec<Term<f64>> {
         let of_position = |law: &Law<f64>| {

@@ -1,4 +1,4 @@
-//! What a model leaves along a recording, and the columns of what could change: what a watch tests.
+//! The residual of a model along a recording, and the columns of possible changes, which a watch tests.
 //!
 //! Rows are those of a band of [`BAND`]: wide enough that a change shows at once, and narrow enough that neighbouring
 //! rows are nearly independent. A joint has no rows while it rests: friction is not determined there.
@@ -25,7 +25,7 @@ pub(super) const PAYLOAD: usize = 4;
 pub(super) const FORCE: usize = 3;
 pub(super) const DELAY: usize = 1;
 
-/// What one joint shows at one row.
+/// The residual and the columns of one joint at one row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shown {
     /// Measured less predicted torque, N·m.
@@ -75,7 +75,7 @@ impl Rows {
         Rows { t, joints: (0..n).map(of_joint).collect() }
     }
 
-    /// What all joints show at one row.
+    /// The residuals and the columns of all joints at one row.
     pub fn row(&self, k: usize) -> impl Iterator<Item = Option<&Shown>> {
         self.joints.iter().map(move |joint| joint.get(k)?.as_ref())
     }

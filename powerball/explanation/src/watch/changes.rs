@@ -1,11 +1,11 @@
-//! A model with what has changed since.
+//! A model with the changes since it was made.
 
 use crate::torque_model::{Payload, TorqueModel};
 use dyngen::arm::ParameterKind;
 use powerball_controller::JointNumber;
 use powerball_logs::regression::{Recording, RigidArm};
 
-/// One change, as it is in a model.
+/// One change of a model.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Change {
     /// Friction of a joint: the whole of it, or its viscous part, more by a share of what it was.

@@ -1,4 +1,4 @@
-//! What a watch says: one event for each change.
+//! The events of a watch: one for each change.
 
 use crate::effects::words::number;
 use powerball_controller::JointNumber;

@@ -1,4 +1,4 @@
-//! What an alarm means: a name where one is clear, and the model with the change.
+//! The meaning of an alarm: a name if one is clear, and the model with the change.
 
 use super::changes::{self, Change};
 use super::event::{Event, Evidence};

@@ -1,8 +1,8 @@
 //! Whether a model still holds: samples in, events out, as a stream.
 //!
-//! The test is [`powerball_controller::change`], whose false alarms have a stated rate; `stream` feeds it with the rows of a
-//! stream, `meaning` says what an alarm means, with a name (`name`). After an event the model has the change, so
-//! that one change is one event.
+//! The test is [`powerball_controller::change`], whose false alarms have a stated rate; `stream` feeds it
+//! with the rows of a stream, `meaning` finds the cause of an alarm, with a name (`name`). After an event the
+//! model has the change, so that one change is one event.
 
 mod buffer;
 mod changes;
@@ -30,7 +30,7 @@ pub struct WatchOptions {
     pub hours: f64,
     /// By how much of itself each joint's friction may wander.
     pub friction_range: f64,
-    /// Where the model file has no colour: the motion of this time is taken as good, s.
+    /// Time whose motion is taken as good if the model file has no colour, s.
     pub learn: f64,
     /// The thresholds for names.
     pub rule: Rule,
@@ -56,7 +56,7 @@ struct Setting<'a> {
     body: &'a RigidArm,
     model: &'a TorqueModel,
     options: &'a WatchOptions,
-    /// What the stream is called.
+    /// The name of the stream.
     file: &'a str,
 }
 
@@ -81,7 +81,7 @@ impl<'a> Watch<'a> {
         Watch { setting: Setting { body, model, options, file }, first: Vec::new(), stream: None }
     }
 
-    /// What is to be reported about the stream in addition to events; each once.
+    /// Notes about the stream in addition to events; each once.
     pub fn notes(&mut self) -> Vec<String> {
         self.stream.as_mut().map(Stream::notes).unwrap_or_default()
     }

@@ -1,7 +1,8 @@
-//! What has changed since: the columns of each effect that could be it, fitted to the rows since then.
+//! The cause of a change: the columns of each possible effect, fitted to the rows since the change.
 //!
-//! Rows and columns pass the colour of each joint's residual first, so that squares are χ². A name's score is what
-//! it explains less penalties for its coefficients and for how many alternatives were tried, as in the rule.
+//! Rows and columns pass the colour of each joint's residual first, so that squares are χ². A name's score is
+//! the part that it explains, less penalties for its coefficients and for how many alternatives were tried,
+//! as in the rule.
 
 use super::changes::Change;
 use crate::effects::{
@@ -22,14 +23,14 @@ const FINE: f64 = 0.02;
 const SHORTEST: f64 = 0.3;
 /// How far before the first guess a change may begin, s.
 const AROUND: f64 = 0.6;
-/// Times that an inertia or a secant is taken anew from the last estimate.
+/// Number of times that an inertia or a secant is computed again from the last estimate.
 const ROUNDS: usize = 4;
 /// Further joints whose friction has changed as well explain at least this much of χ² each.
 const FURTHER: f64 = 30.0;
-/// When exactly a change sets in is known roughly: rows within this time before and after it show nothing of
+/// The start of a change is known only roughly: rows within this time before and after it are not used for
 /// its size, s.
 const BLURRED: [f64; 2] = [0.15, 0.3];
-/// χ² of such a row that noise does not reach.
+/// χ² of such a row, which noise does not reach.
 const ANYTHING: f64 = 16.0;
 /// They hold at most this many times what the others do: a step through the colour is largest where it is.
 const EDGES: f64 = 4.0;
@@ -94,7 +95,7 @@ pub(super) struct Named {
     pub(super) changes: Vec<Change>,
     pub(super) joints: Vec<JointNumber>,
     pub(super) since: f64,
-    /// Where it is over already.
+    /// The end of the change, if it is over already.
     pub(super) until: Option<f64>,
     /// χ² that it explains.
     pub(super) explains: f64,
@@ -282,7 +283,7 @@ impl<'a> Stretch<'a> {
         best_time(guess, |from| self.fitted(&self.cut(columns, from, f64::INFINITY), &[]).1)
     }
 
-    /// A force on the tool or on a link, that goes on or is over.
+    /// A force on the tool or on a link, which continues or is over.
     fn forces(&self, context: &Context<'_>, guess: Guess, now: f64) -> Option<Named> {
         let n = self.data.dof();
         let mut best: Option<(Push, Named)> = None;
@@ -482,7 +483,7 @@ impl<'a> Stretch<'a> {
         })
     }
 
-    /// The best of an effect's candidates, taken anew from its own estimate.
+    /// The best of an effect's candidates, computed again from its own estimate.
     fn one_of(
         &self,
         context: &Context<'_>,
@@ -512,7 +513,7 @@ impl<'a> Stretch<'a> {
     }
 }
 
-/// The one of some names that explains most.
+/// The name that explains most.
 fn best_of(asked: &[(Candidate, Named)], among: &dyn Fn(&Candidate) -> bool) -> Option<Named> {
     let those = asked.iter().filter(|(candidate, _)| among(candidate)).map(|(_, named)| named);
     those.max_by(|a, b| a.score.total_cmp(&b.score)).cloned()

@@ -104,7 +104,7 @@ impl<'a> Stream<'a> {
         self.hop(true)
     }
 
-    /// All bets begin anew.
+    /// Restarts all bets.
     pub(super) fn restart(&mut self) {
         let watched = self.colours.iter().zip(&self.learns);
         let colours: Vec<_> = watched.map(|(colour, learns)| colour.clone().filter(|_| !learns)).collect();

@@ -12,7 +12,7 @@
 //! |---|---|
 //! | `products` | logs on even grids; the signals that a motor's torque is compared with, and their products by block |
 //! | `fit` | ratio and friction from products; standard errors |
-//! | `search` | effects of a transmission in addition to friction and rotor, judged on logs that were not fitted |
+//! | `search` | effects of a transmission beyond friction and rotor, judged on logs that were not fitted |
 
 mod fit;
 mod products;

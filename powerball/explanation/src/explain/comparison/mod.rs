@@ -1,10 +1,10 @@
-//! Which name a residual gets: **here it is decided that a name is given, and where it is taken back.**
+//! The name of a residual: **this module decides that a name is given, and when it is taken back.**
 //!
 //! The candidate group that a step chose is compared with all others on its joints (`naming`). Two names that
-//! fit alike are a question for an experiment; what the steps decided and left open is their history (`open`). Once
-//! everything that fits is in the model, a name is taken back (`withhold`) that says something of a pace
-//! of motion that is not there, that is not distinguished from others while much is left, or that does harm
-//! on logs to judge on.
+//! fit equally well are a question for an experiment; the decisions of the steps and the open questions are
+//! the history (`open`). Once everything that fits is in the model, a name is taken back (`withhold`) if its
+//! effect is missing at some speed of motion, if it cannot be distinguished from others while much error
+//! remains, or if it raises the error on the validation logs.
 
 mod naming;
 mod open;

@@ -1,4 +1,4 @@
-//! Which name a residual gets, and why the others do not.
+//! The choice of a name for a residual, and the reasons against the others.
 
 use super::super::named::Rival;
 use super::super::search::{Extent, Group, Member, Screen};
@@ -83,10 +83,10 @@ pub(crate) fn compare(
     Comparison { margin, rivals, twin, distinct_margin, joints: joints.to_vec() }
 }
 
-/// The share of a rival's score that speaks against a choice.
+/// The share of a rival's score that counts against a choice.
 ///
-/// An event is compared with what lasts over its own time only, whichever of the two was chosen: what lasts
-/// explains all logs, and that says nothing of whether something happened in one of them.
+/// An event is compared with a lasting effect over its own time only, whichever of the two was chosen: a
+/// lasting effect explains all logs, and this does not show whether an event happened in one of them.
 fn share_at_stake(screen: &Screen<'_>, [own, rival]: [&Group; 2]) -> f64 {
     match [event(own), event(rival)] {
         [Some(windows), None] => share_within(screen, rival, &windows),

@@ -1,6 +1,6 @@
-//! Names that logs leave open, each fitted to them: what an experiment can be designed for and decided by.
+//! Names that logs leave open, each fitted to them, for the design and the decision of an experiment.
 //!
-//! Also here: what the steps decided.
+//! The module also keeps the decisions of the steps.
 
 use super::super::model::{Accepted, Model, refitted};
 use super::super::named::Rival;
@@ -63,7 +63,7 @@ impl Hypothesis {
         Design::new(data, &friction_columns(data, &self.fit.shapes), &columns)
     }
 
-    /// What this name explains alone on some data, by joint, N·m.
+    /// The torque that this name explains alone on some data, by joint, N·m.
     #[must_use]
     pub fn own_torque(&self, data: &Data<'_>) -> Signals {
         let columns = self.own_columns(data);
@@ -96,8 +96,8 @@ fn columns(context: &Context<'_>, of: &[Candidate]) -> Vec<Column> {
     of.iter().flat_map(|candidate| context.columns(candidate)).collect()
 }
 
-/// What stays open after all steps: a name with a twin, else a name that was not given for what is left on some joints
-/// without one.
+/// The open question after all steps: a name with an equal rival, else a name that was not given for the
+/// residual of joints without a name.
 pub(crate) fn open(
     study: &Study<'_>,
     model: &Model,
@@ -140,11 +140,9 @@ pub(crate) fn open(
     Some(Open { hypotheses: question.proposals.iter().map(hypothesis).collect() })
 }
 
-// What the steps of the search decided.
-//
-// Also here: a question that logs leave open.
+// The decisions of the steps of the search, and the question that logs leave open.
 
-/// What a step decided.
+/// The decision of a step.
 #[derive(Debug)]
 pub(crate) struct Step {
     pub(crate) number: usize,
@@ -152,7 +150,7 @@ pub(crate) struct Step {
     /// Squared errors before it, by joint, (N·m)² summed over rows.
     pub(crate) square_before: Vec<f64>,
     pub(crate) comparison: Comparison,
-    /// What an experiment would have to decide.
+    /// The question for an experiment.
     pub(crate) question: Option<Question>,
     /// rms on the validation set before it, by joint, N·m.
     pub(crate) before: Vec<f64>,
@@ -160,7 +158,7 @@ pub(crate) struct Step {
     pub(crate) after: Vec<f64>,
 }
 
-/// What the steps decided so far.
+/// The decisions of the steps so far.
 #[derive(Debug, Default)]
 pub(crate) struct History {
     /// Steps whose effects are still in the model.
@@ -178,7 +176,7 @@ pub(crate) struct History {
 pub(crate) enum Why {
     /// A name was given, and another one fits as well.
     Twin,
-    /// What fits best was not given.
+    /// The best candidate was not given as a name.
     Withheld,
 }
 

@@ -1,6 +1,7 @@
-//! Names that are taken back: they turn out not to be distinguished from others, or not to be there.
+//! Names that are taken back because they cannot be distinguished from others, or because their effect is not
+//! there.
 //!
-//! Also here: whether an effect is there at every pace.
+//! The module also tests whether an effect is there at every speed of motion.
 
 use super::super::model::{Accepted, Model};
 use super::super::study::Study;
@@ -14,15 +15,15 @@ use powerball_logs::summary::{OCTAVES, halved};
 use powerball_logs::vector::dot;
 use std::ops::Range;
 
-/// What was taken back, and why.
+/// The candidates that were taken back, and the reason.
 pub(crate) struct Withheld {
     pub(crate) effect: &'static dyn Effect,
     pub(crate) why: &'static str,
 }
 
-/// Takes back what, now that everything that fits is in the model, is not what it is called: an effect
-/// that is missing at some pace; or one that is not distinguished from its rivals and leaves much, so that
-/// something else is there. It stays as a rival of what comes.
+/// Takes back a wrong name, once everything that fits is in the model: an effect that is missing at some
+/// speed of motion; or one that cannot be distinguished from its rivals and leaves a large residual, so that
+/// another effect is there. It stays as a rival of later candidates.
 pub(crate) fn withhold(study: &Study<'_>, model: &mut Model, history: &mut History) -> Option<Withheld> {
     let (taken, why) = if let Some(a) = impossible(study, model) {
         (vec![model.accepted.remove(a)], IMPOSSIBLE)
@@ -38,7 +39,7 @@ pub(crate) fn withhold(study: &Study<'_>, model: &mut Model, history: &mut Histo
     take_back(study, model, history, taken, why)
 }
 
-/// Takes back what cannot be and what makes the error on the logs to judge on larger, and nothing else.
+/// Takes back only effects with impossible values and effects that raise the error on the validation logs.
 pub(crate) fn withhold_harmful(
     study: &Study<'_>,
     model: &mut Model,
@@ -52,9 +53,9 @@ pub(crate) fn withhold_harmful(
     take_back(study, model, history, taken, why)
 }
 
-/// Why something goes out that cannot be as it would have to be.
+/// Reason for an effect with impossible values.
 const IMPOSSIBLE: &str = "its values are impossible";
-/// Why something goes out that makes the error on the logs to judge on larger.
+/// Reason for an effect that raises the error on the validation logs.
 const HARMS: &str = "with it the error on the validation logs is larger";
 
 fn take_back(

@@ -1,4 +1,4 @@
-//! From the accepted effects to a model of the arm, and what that model leaves.
+//! The model of the arm with the accepted effects, and its residual.
 
 use super::super::model::Model;
 use super::super::special::ValidationOnlyEffect;
@@ -13,7 +13,7 @@ use powerball_controller::correction::Term;
 use powerball_identification::estimate::{JointFriction, ParameterEstimate, fit};
 use powerball_logs::regression::{Data, RigidArm, Signals};
 
-/// A model and what it leaves, by joint and row, N·m.
+/// A model and its residual, by joint and row, N·m.
 pub(crate) struct Composed {
     pub(crate) model: TorqueModel,
     /// The arm, where the model changes it.
@@ -31,7 +31,7 @@ pub(crate) struct Composed {
 struct Parts {
     /// In a model of the arm.
     additions: Additions,
-    /// What an arm's parameters gain that were taken for zero or that gravity did not show.
+    /// Additions to the arm's parameters that were assumed zero or that gravity did not show.
     gained: Vec<(Parameter, f64)>,
     /// When the fitted logs have the payload, and when the validation set.
     held: [Vec<Window>; 2],
@@ -39,10 +39,10 @@ struct Parts {
     events: Vec<usize>,
 }
 
-/// The model, and what it leaves on the fitted logs and on the validation set.
+/// The model, and its residual on the fitted logs and on the validation set.
 ///
 /// The residuals are those of the whole model put together, not of the sum of columns that it was fitted
-/// with: what is reported is what a controller computes. They differ by products of small effects.
+/// with: the report is about the torque that a controller computes. They differ by products of small effects.
 pub(crate) fn compose(
     study: &Study<'_>,
     found: &Model,
@@ -80,7 +80,7 @@ pub(crate) fn compose(
     Ok(Composed { model, arm: changed, held, fitted, held_out })
 }
 
-/// What the per-joint fit leaves, and a model of one body with the effects that were found by it.
+/// The residual of the per-joint fit, and a model of one body with the effects that it found.
 pub(crate) fn compose_per_joint(study: &Study<'_>, found: &Model) -> Result<Composed, ExplainError> {
     let of_body = study.joint_fit();
     let base = fit(&of_body.data, &of_body.folds, &[], None);
@@ -93,7 +93,7 @@ pub(crate) fn compose_per_joint(study: &Study<'_>, found: &Model) -> Result<Comp
     })
 }
 
-/// The accepted effects, each as what it is in a model.
+/// The accepted effects, each in its form in a model.
 fn parts(study: &Study<'_>, found: &Model, validation_only: &[ValidationOnlyEffect]) -> Parts {
     let context = found.context(study);
     let on_validation = study.on_validation(&found.fit, &[]);

@@ -1,6 +1,6 @@
-//! From what was found to the result.
+//! The result from the findings.
 //!
-//! Also here: what these logs cannot show, and what to record instead.
+//! The module also reports what these logs cannot show, and what to record instead.
 
 use super::super::comparison::{Comparison, Step, leftover, open};
 use super::super::findings::Findings;
@@ -242,13 +242,13 @@ fn changes(data: &Data<'_>, before: &[Vec<f64>], after: &[Vec<f64>]) -> Vec<Chan
 
 // What these logs cannot show, and what to record instead.
 
-/// Said where each joint was fitted by itself.
+/// Warning if each joint was fitted by itself.
 const PER_JOINT: &str = "the logs repeat one path, and separate models of the joints predict the held-out \
     logs better than one rigid body for all joints: each joint was given inertial parameters of its own, an \
     offset and a slope with its position. All errors here are of these models, and effects of the body \
     (payload, base tilt, broken symmetries) were not considered; model.json holds one body for all joints, \
     whose errors are larger";
-/// Said where the logs to judge on are repeats.
+/// Warning if the validation logs repeat the fitted path.
 const ONE_PATH: &str = "the logs of --validate run the same path as those of --log: what depends on \
     positions (springs, zeros, gravity, broken symmetries, slow ripple) was not considered; record another \
     path";

@@ -1,9 +1,9 @@
-//! How much of what a model leaves some smooth law of the joints' states would take away: what tells noise from a law that
-//! is missing.
+//! The share of a model's residual that a smooth law of the joints' states would explain: it distinguishes
+//! noise from a missing law.
 //!
-//! A Gaussian process (Rasmussen and Williams 2006) by random Fourier features (Rahimi and Recht 2007) is fitted to
-//! what is left on the fitted logs, with the length and the noise that predict parts of them best, and is asked on the
-//! validation set.
+//! A Gaussian process (Rasmussen and Williams 2006) by random Fourier features (Rahimi and Recht 2007) is
+//! fitted to the residual on the fitted logs, with the length and the noise that predict parts of them best,
+//! and is tested on the validation set.
 
 use super::super::study::Study;
 use chacha20::ChaCha8Rng;
@@ -46,7 +46,7 @@ struct Rows {
     states: Vec<Vec<f64>>,
     /// Mean and standard deviation of each state.
     scale: Vec<[f64; 2]>,
-    /// What is left, N·m.
+    /// The residual, N·m.
     y: Vec<f64>,
     /// The part to which each row belongs.
     part: Vec<usize>,
@@ -56,7 +56,7 @@ struct Rows {
 const OWN: usize = 4;
 
 impl Rows {
-    /// Those of a joint; states are scaled as those of `like`.
+    /// The states and the residual of a joint; states are scaled like those of `like`.
     fn new(data: &Data<'_>, joint: usize, left: &[f64], like: Option<&Rows>) -> Rows {
         let n = data.dof();
         let slow = data.rest_velocity[joint];

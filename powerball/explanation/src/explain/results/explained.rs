@@ -1,6 +1,7 @@
-//! What an explanation says; serialized it is explained.json.
+//! The result of an explanation; serialized it is explained.json.
 //!
-//! Also here: what is reported about an experiment that tells names apart, and the plot that shows an effect.
+//! The module also has the report on an experiment that distinguishes names, and the plot that shows an
+//! effect.
 
 use super::super::comparison::Open;
 use super::super::model::Model;
@@ -27,7 +28,7 @@ pub struct Explained {
     pub unusable: Vec<String>,
     /// How well each joint's torque is predicted: the first thing to read.
     pub verdict: Vec<Verdict>,
-    /// Whether each log is like the others, and what differs where it is not: those that were fitted first.
+    /// Whether each log is like the others, and its differences; the fitted logs come first.
     pub logs: Vec<LogResult>,
     /// The arm's name.
     pub arm: String,
@@ -37,10 +38,10 @@ pub struct Explained {
     /// The joints that do not move in the logs to fit; not part of the JSON.
     #[serde(skip)]
     pub resting: Vec<JointNumber>,
-    /// What the columns of the logs are, where they were asked.
+    /// The meaning of the logs' columns, if they were checked.
     pub conventions: Option<Conventions>,
-    /// What is between the motors' torques and the links', by joint, where logs hold both. Its effects are on
-    /// the motors' side: none of them is in `effects`, nor in the errors here.
+    /// The transmission between the motors' torques and the links', by joint, if logs hold both. Its effects
+    /// are on the motors' side: none of them is in `effects`, nor in the errors here.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transmission: Option<Vec<JointTransmission>>,
     /// Errors of the base model.
@@ -49,14 +50,14 @@ pub struct Explained {
     pub after: FitErrors,
     /// How the error of each joint that moves changes on the validation set.
     pub held_out_change: Vec<Change>,
-    /// What white measurement noise alone would leave in the band, by joint, N·m.
+    /// Residual of white measurement noise alone in the band, by joint, N·m.
     pub noise_floor: Vec<f64>,
     /// By joint, the share of the squared error left on the validation set that a smooth function of the joints' states
     /// would take away there: much where a law is missing, little where the rest is noise.
     pub explainable: Vec<f64>,
     /// Accepted effects in the order in which they were added.
     pub effects: Vec<NamedEffect>,
-    /// What is there without a name, as formulas.
+    /// Effects without a name, as formulas.
     pub laws: Vec<UnnamedLaw>,
     /// Band of all errors here, Hz: the widest, where joints have their own.
     pub band: [f64; 2],
@@ -66,11 +67,11 @@ pub struct Explained {
     pub fitted_time: f64,
     /// Samples that the residuals are worth, all joints together.
     pub effective_samples: usize,
-    /// What no candidate explains.
+    /// The part of the residual that no candidate explains.
     pub unattributed: Option<Unattributed>,
-    /// What to record to tell the names apart that these logs leave open.
+    /// The recording that would distinguish the names that these logs leave open.
     pub next_experiment: Option<NextExperiment>,
-    /// What an experiment that was made for open names has decided.
+    /// The decision of an experiment that was made for open names.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub experiment: Option<Experiment>,
     /// The open names, fitted; not part of the JSON.
@@ -78,7 +79,7 @@ pub struct Explained {
     pub open: Option<Arc<Open>>,
     /// How often the rule accepts effects that are not there, on these data.
     pub false_positives: FalsePositives,
-    /// What was found in logs and arm file, and what was done about it.
+    /// Faults of the logs and the arm file, and how they were handled.
     pub warnings: Vec<String>,
     /// Torques over time on the validation set, by joint; not part of the JSON.
     #[serde(skip)]
@@ -124,10 +125,10 @@ pub struct Change {
 
 // What is reported about an experiment that tells names apart.
 
-/// What to record to tell names apart that logs leave open.
+/// The recording that would distinguish the names that logs leave open.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NextExperiment {
-    /// What to do, in words.
+    /// A sentence that says what to do.
     pub advice: String,
     /// The names.
     pub to_tell_apart: Vec<&'static str>,
@@ -166,7 +167,7 @@ pub enum Trajectory {
     },
 }
 
-/// What an experiment that was made for open names has decided.
+/// The decision of an experiment that was made for open names.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Experiment {
     /// The names that were open.
@@ -179,7 +180,7 @@ pub struct Experiment {
     pub why: String,
     /// χ² by which the better name leads on the fitted logs.
     pub evidence: f64,
-    /// Probability of such a lead by chance.
+    /// Probability of so large a lead by chance.
     pub p_value: f64,
     /// χ² by which it leads on the held-out logs.
     pub held_out_evidence: f64,

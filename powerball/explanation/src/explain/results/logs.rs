@@ -1,7 +1,7 @@
 //! Log by log: is it like the others, and what is different in it?
 //!
-//! All logs are fitted together here, so that they are judged alike: a log whose path the others do not have would else
-//! be odd by what the model does not know of that path.
+//! All logs are fitted together here, so that they are judged alike: otherwise a log with a path of its own
+//! would differ only because the model does not know that path.
 
 use super::super::by_log::{Changed, Together, changes};
 use super::super::findings::Findings;
@@ -14,17 +14,17 @@ use powerball_controller::JointNumber;
 use powerball_logs::regression::{Data, Signals};
 use serde::Serialize;
 
-/// What is reported about one log.
+/// The report on one log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LogResult {
     /// The log's file.
     pub log: String,
     /// Whether nothing was found in it that other logs have not, and the model predicts it as well as them.
     pub like_the_others: bool,
-    /// What a model of all logs leaves of it, squared error, mean over joints, over the most that it leaves of another
-    /// log; what differs is in the model.
+    /// Squared error of a model of all logs on this log, mean over joints, divided by the largest one on
+    /// another log; the differences are in the model.
     pub error_ratio: Option<f64>,
-    /// What is in it and not in all others.
+    /// The differences of this log from the others.
     pub differs: Vec<Difference>,
 }
 
@@ -62,7 +62,7 @@ struct Judged<'a> {
     data: &'a Data<'a>,
     side: usize,
     log: usize,
-    /// What the model leaves, by joint and row.
+    /// Residual of the model, by joint and row.
     residual: &'a Signals,
 }
 

@@ -1,10 +1,11 @@
-//! What is reported about the findings.
+//! The report on the findings.
 //!
-//! `conclude` makes the result ([`Explained`], in `explained` with its plots and what an experiment would decide) and the
-//! warnings that a reader must know: `compose` the model of what was accepted and what that leaves, `unattributed` what stays
-//! without a name and what it depends on, `explainable` how much of the rest some law could be, `unnamed` the formulas of what has no name, `logs` what is different in which log, `verdict` how far each joint is explained, whether all of it agrees, and how
-//! often such a name is right.
-//! JSON is made of these types by whoever writes it, and nothing here reads it.
+//! `conclude` makes the result ([`Explained`], in `explained` with its plots and what an experiment would
+//! decide) and the warnings that a reader must know: `compose` makes the model with the accepted effects and
+//! its residual, `unattributed` the residual without a name and its dependencies, `explainable` the share of
+//! it that a smooth law could explain, `unnamed` the formulas of effects without a name, `logs` the
+//! differences of each log, `verdict` how far each joint is explained, whether all parts agree, and how often
+//! such a name is right. The caller writes these types as JSON, and no module here reads that.
 
 mod compose;
 mod conclude;

@@ -1,6 +1,6 @@
-//! What stays without a name.
+//! The residual without a name.
 //!
-//! Also here: dependencies of a residual.
+//! The module also finds the dependencies of a residual.
 
 use super::super::comparison::History;
 use super::super::model::Model;
@@ -14,7 +14,7 @@ use powerball_logs::regression::Data;
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 
-/// What stays without a name.
+/// The residual without a name.
 #[derive(Clone, Debug, Serialize)]
 pub struct Unattributed {
     /// Joints.
@@ -162,8 +162,8 @@ const BINS: usize = 12;
 /// Time shifts of a signal that show what chance gives.
 const SHIFTS: usize = 19;
 
-/// What a joint's residual may depend on, by its rows: positions, velocities and accelerations of all joints,
-/// the rigid arm's torque on this one, and time.
+/// The signals on which a joint's residual may depend, by its rows: positions, velocities and accelerations
+/// of all joints, the rigid arm's torque on this one, and time.
 #[must_use]
 pub(crate) fn signals(context: &Context<'_>, joint: usize) -> Vec<(String, Vec<f64>)> {
     let data = context.data;

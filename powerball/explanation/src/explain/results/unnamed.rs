@@ -1,4 +1,4 @@
-//! What is there without a name, as a formula.
+//! An effect without a name, as a formula.
 
 use super::super::comparison::Step;
 use super::super::model::{Accepted, Model};
@@ -11,8 +11,8 @@ use serde::Serialize;
 /// A torque without a name that joints feel, as a formula that holds on logs that were not fitted.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct UnnamedLaw {
-    /// As text: `tau2 = c1·q2·q3 + …`; tau in N·m, positions and velocities in rad and rad/s (m and m/s where
-    /// a joint slides).
+    /// The law as text: `tau2 = c1·q2·q3 + …`; tau in N·m, positions and velocities in rad and rad/s (m and
+    /// m/s where a joint slides).
     pub formula: String,
     /// The formula for LaTeX.
     pub latex: String,
@@ -30,7 +30,7 @@ pub struct UnnamedLaw {
 }
 
 impl UnnamedLaw {
-    /// The formula with its numbers and what it does, as a sentence.
+    /// A sentence with the formula, its numbers and its effect on the error.
     #[must_use]
     pub fn sentence(&self) -> String {
         let number = |c: &LawCoefficient| format!("{} = {:.4} ± {:.1e} {}", c.name, c.value, c.std, c.unit);
@@ -50,7 +50,7 @@ impl UnnamedLaw {
 /// A coefficient of a law.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LawCoefficient {
-    /// As in the formula.
+    /// Name as in the formula.
     pub name: String,
     /// The coefficient's value.
     pub value: f64,

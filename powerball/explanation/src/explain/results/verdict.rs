@@ -1,6 +1,6 @@
 //! The first line of every answer: how well each joint's torque is predicted, and what to do about the rest.
 //!
-//! Also here: whether an explanation contradicts itself.
+//! The module also checks that an explanation does not contradict itself.
 
 use super::super::named::NamedEffect;
 use super::super::study::Study;
@@ -20,14 +20,16 @@ pub struct Verdict {
     pub state: State,
     /// rms of what is left over rms of the measured torque; not a number where the joint does not move.
     pub left: f64,
-    /// What the rest depends on, the likely kinds, and what to record or check; empty where little is left.
+    /// The dependencies of the remaining error, its likely causes, and what to record or check; empty if
+    /// little remains.
     pub advice: String,
 }
 
 /// How well a torque is predicted by the model with what was named. The first of these that is so holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum State {
-    /// What is left is hardly more than measurement noise ([`above_floor`](crate::rule::Rule::above_floor)).
+    /// The remaining error is hardly more than measurement noise
+    /// ([`above_floor`](crate::rule::Rule::above_floor)).
     #[serde(rename = "at the noise floor")]
     AtNoiseFloor,
     /// Little of the torque is left ([`predicted_share`](crate::rule::Rule::predicted_share)).
@@ -241,7 +243,7 @@ fn is_named(explained: &Explained, name: &str, joints: &[JointNumber]) -> bool {
 
 // How often a name with such evidence is right: a curve that was fitted to arms whose effects are known.
 
-/// What is known of a name in addition to what it stands for.
+/// The evidence for a name: features that predict how often such a name is right.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Evidence {
     /// The name's penalised gain over that of the next best name.
@@ -255,8 +257,9 @@ pub struct Evidence {
 /// Numbers that the logit of the probability is linear in.
 pub const FEATURES: usize = 4;
 
-/// What they are weighted with: logistic regression (D. R. Cox, "The regression analysis of binary sequences", 1958) on one
-/// half of drawn arms, judged on the other half. `cargo run --release -p xtask -- probability` fits them anew.
+/// Weights of the features: logistic regression (D. R. Cox, "The regression analysis of binary sequences",
+/// 1958) on one half of drawn arms, judged on the other half. `cargo run --release -p xtask -- probability`
+/// fits them again.
 const COEFFICIENTS: [f64; FEATURES] = [1.74, 2.36, 1.81, -2.71];
 
 /// A larger margin says no more.
@@ -265,7 +268,7 @@ const LARGEST_MARGIN: f64 = 20.0;
 const SUREST: f64 = 0.99;
 
 impl Evidence {
-    /// What is known of a name that was given.
+    /// The evidence for a name that was given.
     pub(super) fn of(effect: &NamedEffect) -> Evidence {
         let alike = effect.rivals.iter().any(|rival| rival.alike);
         Evidence { margin: effect.margin, alike, leftover: effect.leftover }
@@ -280,7 +283,7 @@ impl Evidence {
         [1.0, f64::from(u8::from(self.alike)), margin, leftover]
     }
 
-    /// How often such a name is right, or where another one fits as well, how often one of them is.
+    /// Probability that such a name is right, or that one of them is, if another one fits as well.
     #[must_use]
     pub fn probability(&self) -> f64 {
         let logit: f64 = COEFFICIENTS.iter().zip(self.features()).map(|(c, x)| c * x).sum();

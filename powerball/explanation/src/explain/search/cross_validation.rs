@@ -1,9 +1,9 @@
-//! What speaks for a candidate that takes much of an error away, on logs that hold few seconds.
+//! The evidence for a candidate that removes a large part of the error, on short logs.
 //!
 //! A small effect needs many blocks and folds to be distinguished from chance; one that lowers an error by a
 //! tenth and more needs only a few seconds. It is judged both ways round: fitted to the logs and judged on
 //! the validation set, fitted to the validation set and judged on the logs; each time the squared error must
-//! fall by a share that chance does not give, and both must say the same. Significance is that of blocks as
+//! fall by a share that chance does not give, and both must agree. Significance is that of blocks as
 //! long as the residual's own memory.
 
 use super::super::model::Model;
@@ -21,11 +21,11 @@ pub(crate) struct CrossValidation {
     fit: Fit,
     /// The model's columns on the logs that the model was fitted to.
     design: Design,
-    /// What it leaves there.
+    /// Residual of the model there.
     residual: Signals,
 }
 
-/// What both ways say.
+/// The results of both ways.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CrossValidated {
     /// The share by which the squared error of the candidate's joints falls on the logs that took no part in
@@ -52,7 +52,7 @@ impl CrossValidation {
         CrossValidation { fit, design, residual }
     }
 
-    /// What it leaves on the logs that the model was fitted to, by joint and row, N·m.
+    /// Residual on the logs that the model was fitted to, by joint and row, N·m.
     pub(crate) fn residual(&self) -> &Signals {
         &self.residual
     }

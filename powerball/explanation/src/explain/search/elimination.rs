@@ -1,6 +1,7 @@
-//! Backward elimination: what later additions made unneeded goes out again.
+//! Backward elimination: effects that later additions made unnecessary are removed.
 //!
-//! Also here: what is in the model from the start; settings refined once everything is in the model.
+//! The module also judges the effects that are in the model from the start, and refines settings once
+//! everything is in the model.
 
 use super::super::model::{Accepted, Model, Origin};
 use super::super::study::Study;
@@ -74,7 +75,7 @@ fn weakest(study: &Study<'_>, model: &Model) -> Option<usize> {
     weakest.map(|(k, _)| k)
 }
 
-/// By how much χ² is less with each accepted effect than without it, all else fitted anew.
+/// By how much χ² is less with each accepted effect than without it, all else fitted again.
 pub(crate) fn gains(model: &Model) -> Vec<f64> {
     let columns: Vec<Vec<usize>> = model.places().into_iter().map(Iterator::collect).collect();
     falls(model, &columns)
@@ -93,7 +94,7 @@ fn falls(model: &Model, sets: &[Vec<usize>]) -> Vec<f64> {
 
 // What is in the model from the start: which of it is needed once everything else is known.
 
-/// What speaks for a part of the model, everything else refitted.
+/// The evidence for a part of the model, with everything else refitted.
 struct Needed {
     /// The part's place among what was accepted.
     place: usize,

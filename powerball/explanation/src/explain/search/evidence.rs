@@ -1,6 +1,6 @@
-//! What speaks for a candidate: blocks that agree, folds that gain, a validation set that gains.
+//! The evidence for a candidate: blocks that agree, folds that gain, a validation set that gains.
 //!
-//! Also here: whether the evidence for a candidate is enough.
+//! The module also decides whether the evidence for a candidate is sufficient.
 
 use super::screen::{Screen, Trial, fold_gains};
 use crate::effects::Candidate;
@@ -25,8 +25,8 @@ pub(crate) struct Evidence {
     pub(crate) fold_gains: Vec<f64>,
     /// That share on the validation set: the median over its logs.
     pub(crate) validation_gain: f64,
-    /// Of an event: how much of what its time has more than other times of squared error stays; 1 and more where that
-    /// time has no more than others.
+    /// For an event: the remaining share of the additional squared error of its time over other times; 1 or
+    /// more if that time has no larger error than others.
     pub(crate) event_left: Option<f64>,
 }
 
@@ -39,7 +39,7 @@ impl Evidence {
     }
 }
 
-/// Where a candidate acts.
+/// The extent in which a candidate acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Extent {
     /// In all logs.
@@ -51,7 +51,7 @@ pub(crate) enum Extent {
 }
 
 impl Extent {
-    /// That of a candidate.
+    /// The extent of a candidate.
     pub(crate) fn of(candidate: &Candidate) -> Extent {
         match candidate.windows.iter().map(|w| w.to - w.from).reduce(f64::max) {
             None => Extent::Everywhere,
@@ -68,7 +68,7 @@ pub(crate) struct Validation<'p> {
     pub(crate) data: &'p Data<'p>,
     /// The base's columns on it.
     pub(crate) design: Design,
-    /// What the base leaves on it.
+    /// Residual of the base on it.
     pub(crate) residual: Signals,
 }
 
@@ -158,7 +158,7 @@ pub(crate) fn wald(screen: &Screen<'_>, trial: &Trial, blocks: &[Block]) -> f64 
     f_tail(wald / used * freedom / clusters, used, freedom)
 }
 
-/// What a trial leaves, given its columns with the base's shares taken out.
+/// The residual of a trial, given its columns without the base's shares.
 pub(super) fn left(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]) -> Signals {
     let of = |(columns, residual): (&Vec<Vec<f64>>, &Vec<f64>)| {
         let mut e = residual.clone();

@@ -62,7 +62,7 @@ impl Group {
         best(self.members.iter())
     }
 
-    /// What was not refused.
+    /// The members that were not refused.
     pub(crate) fn passing(&self) -> impl Iterator<Item = &Member> {
         self.members.iter().filter(|m| m.refusal.is_none())
     }
@@ -82,7 +82,7 @@ fn best<'m>(members: impl Iterator<Item = &'m Member>) -> Option<&'m Member> {
     members.max_by(|a, b| a.trial.score.total_cmp(&b.trial.score))
 }
 
-/// What is looked for.
+/// The kind of candidates to search for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum CandidateKind {
     /// Effects that have a name.
@@ -180,9 +180,9 @@ fn compatible(screen: &Screen<'_>, mut members: Vec<Member>) -> Vec<Member> {
     members
 }
 
-/// Members with what each adds to the better ones, not what it explains alone: the zeros of two encoders on
-/// parallel axes are one thing twice, and their sum would win over a name that is as good as each. What adds
-/// too little goes out. Only what acts on all joints can be so alike.
+/// Members with the gain that each adds to the better ones, not with the gain of each alone: the zeros of two
+/// encoders on parallel axes are the same effect twice, and their sum would win over a name that is as good
+/// as each. Members that add too little are removed. Only effects that act on all joints can be so similar.
 fn without_repeats(screen: &Screen<'_>, members: Vec<Member>) -> Vec<Member> {
     let dof = screen.context.data.dof();
     let wide = |m: &Member| m.trial.columns.iter().all(|column| column.parts.len() == dof);
@@ -270,7 +270,7 @@ fn begins_with(earlier: &Candidate, event: &Candidate, same_event: f64) -> bool 
     })
 }
 
-/// The accepted effect of which a member would only mend the law: on the joints where no accepted effect
+/// The accepted effect of which a member would only correct the law: on the joints where no accepted effect
 /// is large compared with it, it would not count.
 fn only_corrects(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<&'static str> {
     let (rule, effect) = (screen.context.rule, member.candidate.effect());
@@ -296,7 +296,7 @@ fn only_corrects(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<
     corrected.filter(|_| rest < rule.least_score)
 }
 
-/// What the evidence for members is computed from.
+/// The data from which the evidence for members is computed.
 pub(crate) struct Tester<'t> {
     pub(crate) study: &'t Study<'t>,
     pub(crate) screen: &'t Screen<'t>,
@@ -317,8 +317,8 @@ impl Tester<'_> {
         let open: Vec<usize> = (0..group.members.len())
             .filter(|m| group.members[*m].refusal.is_none() && group.members[*m].evidence.is_none())
             .collect();
-        // An experiment leaves the paths of the other logs on purpose: a fold that holds all of it out
-        // asks how the base model extrapolates. What the experiment speaks for is asked stretch by
+        // An experiment leaves the paths of the other logs on purpose: a fold that holds all of it out would
+        // test how the base model extrapolates. The name that the experiment favours is tested stretch by
         // stretch of every log instead.
         let spoken_for = self.study.options.ruled_out.iter().any(|r| r.in_favour_of == group.name());
         let found = parallel::map(&open, |m| {
@@ -351,7 +351,7 @@ impl Tester<'_> {
 pub(crate) struct Judge<'j> {
     pub(crate) study: &'j Study<'j>,
     pub(crate) screen: &'j Screen<'j>,
-    /// What was tried in all.
+    /// Number of candidates that were tried in total.
     pub(crate) tests: f64,
     /// The model without the candidate, fitted to the validation set …
     pub(crate) cross_validation: &'j OnceLock<CrossValidation>,
@@ -360,7 +360,7 @@ pub(crate) struct Judge<'j> {
 }
 
 impl Judge<'_> {
-    /// Why a candidate is refused: neither many blocks and folds nor both ways round speak for it.
+    /// Why a candidate is refused: neither many blocks and folds nor both ways round support it.
     pub(crate) fn judge(
         &self,
         candidate: &Candidate,

@@ -1,10 +1,11 @@
-//! How candidates are looked for, and what speaks for them.
+//! The search for candidates, and the evidence for them.
 //!
 //! A screen refits the base model with each candidate (`screen`); the best ones of each effect are a
 //! candidate group (`groups`); for the group that could reach most the evidence is gathered from independent
-//! blocks, from held-out folds and from the validation set, and judged (`evidence`); time-shift surrogates say how
-//! often these very data agree by chance (`surrogates`). What stays in the model is moved to where everything together
-//! fits best, and what later additions made unneeded goes out again (`elimination`).
+//! blocks, from held-out folds and from the validation set, and judged (`evidence`); time-shift surrogates
+//! show how often these data agree by chance (`surrogates`). The settings in the model are refined until
+//! everything together fits best, and effects that later additions made unnecessary are removed
+//! (`elimination`).
 
 mod cross_validation;
 mod elimination;

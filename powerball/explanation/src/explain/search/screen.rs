@@ -1,6 +1,7 @@
-//! What a candidate would explain with the base refitted: a small solve a candidate.
+//! The part of the residual that a candidate would explain with the base refitted: one small solve per
+//! candidate.
 //!
-//! Also here: what it would explain of held-out folds.
+//! The module also computes the part that it would explain of held-out folds.
 
 use crate::effects::{Candidate, Context};
 use crate::rule::Rule;
@@ -42,7 +43,7 @@ pub(crate) struct Trial {
     pub(crate) score: f64,
 }
 
-/// What columns explain in addition to the base; a [`Trial`] without its columns.
+/// The part that columns explain in addition to the base; a [`Trial`] without its columns.
 #[derive(Clone, Debug)]
 pub(super) struct Solved {
     theta: Vec<f64>,
@@ -51,7 +52,7 @@ pub(super) struct Solved {
     pub(super) score: f64,
 }
 
-/// What a score takes off a gain: for coefficients, and for having searched.
+/// The penalty of a score: for coefficients, and for having searched.
 pub(crate) fn penalty(rule: &Rule, coefficients: usize, searched: f64) -> f64 {
     rule.per_coefficient * coefficients as f64 + 2.0 * searched.max(1.0).ln()
 }
@@ -63,7 +64,8 @@ impl<'c> Screen<'c> {
         Screen::without(context, 0..0)
     }
 
-    /// As [`Self::new`], without some of the model's columns, of whose torque the context's residual is free.
+    /// Like [`Self::new`], without some of the model's columns, of whose torque the context's residual is
+    /// free.
     #[must_use]
     pub(crate) fn without(context: &'c Context<'c>, columns: Range<usize>) -> Screen<'c> {
         let fit = context.fit;
@@ -124,7 +126,7 @@ impl<'c> Screen<'c> {
         products
     }
 
-    /// What columns explain in addition to the base, from their products.
+    /// The part that columns explain in addition to the base, from their products.
     pub(super) fn solve(&self, products: &Added, searched: f64) -> Option<Solved> {
         let (base, rest) = products.without_base(&self.solver);
         let score: Vec<f64> =
@@ -178,8 +180,6 @@ impl<'c> Screen<'c> {
 }
 
 // Held-out gains: the base is fitted once without each fold, a candidate then costs a small solve.
-//
-// Also here: the base model fitted once without each fold.
 
 /// Share by which the held-out squared error of the given joints falls with a candidate, by fold; the base
 /// and the candidate are fitted to the rest.

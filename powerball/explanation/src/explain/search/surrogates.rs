@@ -1,7 +1,7 @@
-//! Surrogates: candidates shifted in time, or with the signs of recordings drawn, that cannot be true, asked the same
-//! questions. They tell how often these very data say yes by chance.
+//! Surrogates: candidates shifted in time, or with the signs of recordings drawn, that cannot be true and
+//! pass through the same tests. They show how often these data accept a candidate by chance.
 //!
-//! Also here: columns shifted in time, thousands of times.
+//! The module also shifts columns in time, thousands of times.
 
 use super::super::model::Model;
 use super::super::named::FalsePositives;
@@ -24,7 +24,7 @@ use std::sync::Arc;
 /// Draws the final surrogates; a step draws by its number.
 const FINAL_SEED: u64 = 99;
 
-/// A surrogate: of which trial, how it was made, and what it scores.
+/// A surrogate: its trial, how it was made, and its score.
 struct Surrogate {
     which: usize,
     shift: Shift,
@@ -47,11 +47,11 @@ fn exceeded(mut scores: Vec<f64>, share: f64) -> f64 {
     scores.get((scores.len() as f64 * share) as usize).copied().unwrap_or(0.0)
 }
 
-/// Draws surrogates of real trials; `None` for one that would be what it is drawn from.
+/// Draws surrogates of real trials; `None` for one that would equal its original.
 ///
-/// Columns are shifted in time within each recording. Where a shift leaves one of them what it was (a constant
-/// torque, a wave of this very period), the signs of the recordings are drawn as well, the same for all columns.
-/// Neither helps a constant in a single recording: it has no surrogate.
+/// Columns are shifted in time within each recording. If a shift does not change one of them (a constant
+/// torque, a wave of this very period), the signs of the recordings are drawn as well, the same for all
+/// columns. Neither helps a constant in a single recording: it has no surrogate.
 fn draw(screen: &Screen<'_>, trials: &[&Trial], count: usize, seed: u64) -> Vec<Option<Surrogate>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let recordings = screen.context.data.joints.iter().map(|j| j.rows.len()).max().unwrap_or(0);
@@ -155,7 +155,8 @@ fn shifted(column: &Column, joints: &[JointRows], shift: &Shift) -> Column {
     Column { parts: column.parts.iter().map(of).collect() }
 }
 
-/// Values shifted within each recording, whose rows are given; what leaves at one end comes in at the other.
+/// Values shifted within each recording, whose rows are given; values that leave at one end enter at the
+/// other.
 fn rotated(values: &[f64], recordings: &[Range<usize>], shift: &Shift) -> Vec<f64> {
     let mut values = values.to_vec();
     for rows in recordings {
@@ -183,9 +184,9 @@ impl Shift {
     }
 }
 
-/// Of each shift what is left of it as a surrogate: itself without signs where the shift alone makes the columns unlike
-/// themselves, with signs where these are needed (a constant torque, a wave of this very period), `None` where
-/// neither helps. `limit` is the largest correlation of a surrogate with what it is made of.
+/// The surrogate of each shift: without signs if the shift alone makes the columns different from the
+/// original ones, with signs if these are needed (a constant torque, a wave of this very period), `None`
+/// where neither helps. `limit` is the largest correlation of a surrogate with its original.
 pub(super) fn unlike(
     columns: &[Column],
     joints: &[JointRows],
@@ -204,11 +205,11 @@ pub(super) fn unlike(
     shifts.iter().enumerate().map(of).collect()
 }
 
-/// How like a surrogate is to what it is made of.
+/// The similarity of a surrogate to its original.
 struct Likeness {
-    /// Where it is shifted.
+    /// Similarity if it is only shifted.
     correlation: f64,
-    /// Where it is shifted and has the signs of recordings turned: means and all.
+    /// Similarity if it is shifted and the signs of recordings are changed, means included.
     cosine: f64,
 }
 
@@ -386,7 +387,7 @@ mod shifts_tests {
         [Shift { fraction, signs: signs.to_vec() }]
     }
 
-    /// A constant is what it was wherever it is shifted to: with two recordings its signs are drawn, with one it
+    /// A shift does not change a constant: with two recordings its signs are drawn, with one it
     /// has no surrogate.
     #[test]
     fn a_constant_has_surrogates_where_there_are_two_recordings() {

@@ -1,8 +1,8 @@
-//! A touch of an arm that stands still, or that the touch has stopped.
+//! Contact with an arm that stands still, or that the contact has stopped.
 //!
-//! Rows at rest take no part in any fit: friction there is anything between its levels of either direction. But how far
-//! the torque at rest may be from the model's is seen in the rests of other logs. A torque beyond that, and beyond
-//! friction, is of something outside, however long it stays.
+//! No fit uses rows at rest: friction there has any value between its levels of both directions. But the
+//! rests of other logs show how far the torque at rest may be from the model's. A torque beyond that, and
+//! beyond friction, has an external cause, however long it lasts.
 
 use super::super::study::Study;
 use crate::effects::Window;
@@ -58,8 +58,8 @@ const LEAST_NOISE: f64 = 1e-9;
 const FOOT: f64 = 0.25;
 /// Motors whose torques are all below this share of the limits hold no arm that has weight: its brakes do.
 const BRAKED: f64 = 0.5;
-/// One force explains at least so much of a push. It acts on another link than the last one where that link's origin
-/// explains so much more than the tool.
+/// Least share of a push that one force must explain. It acts on another link than the last one if that
+/// link's origin explains this share more than the tool.
 const EXPLAINED: f64 = 0.5;
 const OTHER_LINK: f64 = 0.2;
 /// What is there for this share of the rests of a log, of which there are several, is carried, and no push.
@@ -145,7 +145,7 @@ struct Limits {
 impl Limits {
     fn new(joints: &[Usual], others: &[&Rest<'_>], own: &[Rest<'_>]) -> Limits {
         let seconds: f64 = others.iter().map(|rest| rest.calm_seconds()).sum();
-        // A median over rests, most of which nobody touches.
+        // A median over rests, most of which are without contact.
         let noise = |j: usize| {
             let mut all: Vec<f64> = others.iter().copied().chain(own).map(|rest| rest.noise(j)).collect();
             median(&mut all)
@@ -176,7 +176,7 @@ struct Rest<'r> {
     left: Vec<Vec<f64>>,
     /// Measured torque in the band by joint, N·m.
     torque: Vec<Vec<f64>>,
-    /// Where nothing pushes, as far as that is known.
+    /// Rests without an external force, as far as is known.
     calm: Vec<bool>,
 }
 

@@ -1,9 +1,10 @@
-//! What is special in some logs, found before the search and apart from it.
+//! Special properties of some logs, found before the search and separately from it.
 //!
 //! A validation set that repeats the path of the fitted logs cannot judge functions of that path
-//! (`one_path`); there a fit of each joint by itself may predict better than one multibody model, and where the times of
-//! logs do not tell when they were recorded, what warms does. Something may be held in logs of the validation set only, or
-//! in all others (`validation_only`), or push an arm that stands still (`at_rest`).
+//! (`one_path`); there a fit of each joint by itself may predict better than one multibody model, and if the
+//! times of logs do not show when they were recorded, the warming of the arm does. A body may be held in logs
+//! of the validation set only, or in all others (`validation_only`), or push an arm that stands still
+//! (`at_rest`).
 
 mod at_rest;
 mod one_path;

@@ -1,7 +1,8 @@
-//! Whether the logs to judge on run the same path as the fitted ones: then what is a
-//! function of the path cannot be judged.
+//! Whether the validation logs run the same path as the fitted ones: then functions of the path cannot be
+//! judged.
 //!
-//! Also here: on a repeated path, the joint fit or one fit a joint; when logs were recorded, where their times do not tell.
+//! The module also chooses between one fit for all joints and one fit per joint on a repeated path, and finds
+//! when logs were recorded if their times do not show it.
 
 use super::super::model::Model;
 use super::super::search::{Screen, Trial, Validation, validation_gain};
@@ -61,18 +62,18 @@ pub(crate) fn predicts_better(model: (&Study<'_>, &Model), rival: (&Study<'_>, &
     log_ratio < rows * (1.0 - model.0.rule().clearly_better).ln()
 }
 
-// When logs were recorded, where their times do not tell.
+// When logs were recorded, if their times do not show it.
 //
-// Times that start anew in each file say nothing of when a file was recorded; the order of the files is
-// taken for it, and the logs of `--validate` then come after those of `--log`. But they may as well have
-// been recorded in between (every other repeat is held out, say), and a series of repeats that starts from
-// another place may have started with a cold arm. What warms up tells these apart: the one that it fits
-// best is taken.
+// Times that restart in each file do not show when a file was recorded; the order of the files is used
+// instead, and the logs of `--validate` then come after those of `--log`. But they may as well have been
+// recorded in between (every other repeat is held out, say), and a series of repeats that starts from another
+// place may have started with a cold arm. Warming distinguishes these cases: the one that it fits best is
+// taken.
 
 /// When logs were recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Clock {
-    /// As their times or their order say.
+    /// The order that their times or the files give.
     AsGiven,
     /// The logs to judge on lie in between the fitted ones.
     InBetween,
@@ -82,7 +83,7 @@ pub(crate) enum Clock {
 }
 
 impl Clock {
-    /// What a reader must know.
+    /// A note for the reader of the result.
     pub(crate) fn note(self) -> Option<&'static str> {
         match self {
             Clock::AsGiven => None,
@@ -174,13 +175,13 @@ fn same_start(
     move |a, b| reach.iter().enumerate().all(|(j, reach)| (a.q[j] - b.q[j]).abs() <= *reach)
 }
 
-/// Clocks that begin anew with every series of runs that are `same`; runs of one set are taken to alternate
+/// Clocks that restart with every series of runs that are `same`; runs of one set are taken to alternate
 /// with those of the other.
 fn in_series(data: &Data<'_>, other: &Data<'_>, same: impl Fn(&Recording, &Recording) -> bool) -> Vec<f64> {
     let lasting = |r: &Recording| r.len() as f64 / r.rate;
     let mut clocks = Vec::with_capacity(data.recordings.len());
     for (at, r) in data.recordings.iter().enumerate() {
-        // The first recording of a log stands for its run.
+        // The first recording of a log represents its run.
         let run = data.recordings[..at].iter().find(|first| first.log == r.log).unwrap_or(r);
         let of_series = |d: &Data<'_>, until: usize| -> f64 {
             let runs = d.recordings.iter().filter(|x| x.log < until);

@@ -1,5 +1,5 @@
-//! What is in logs of the validation set only, or a body that all fitted logs have and no other one: it is found and
-//! taken out before that set judges anything.
+//! Effects in logs of the validation set only, or a body in all fitted logs and in no other one: they are
+//! found and removed before that set is used for any judgement.
 
 use super::super::comparison::{leftover, relative_score};
 use super::super::named::NamedEffect;
@@ -18,10 +18,10 @@ const MOST: usize = 16;
 /// Draws their surrogates.
 const SEED: u64 = 7;
 
-/// What is in logs of the validation set only, or in all that are fitted.
+/// An effect in logs of the validation set only, or in all fitted logs.
 #[derive(Clone, Debug)]
 pub(crate) struct ValidationOnlyEffect {
-    /// What is reported about it.
+    /// The report on this effect.
     pub(crate) named: NamedEffect,
     /// One entry a window or body.
     pub(crate) parts: Vec<ValidationOnlyPart>,
@@ -30,9 +30,9 @@ pub(crate) struct ValidationOnlyEffect {
 /// One of several pushes, or a body.
 #[derive(Clone, Debug)]
 pub(crate) struct ValidationOnlyPart {
-    /// What it is in a model.
+    /// Its form in a model.
     pub(crate) part: Part,
-    /// Where it is.
+    /// The windows in which it acts.
     pub(crate) windows: Vec<Window>,
     /// Torque of the part on the fitted logs and on the validation set, which was taken out there, by joint
     /// and row, N·m.
@@ -116,7 +116,7 @@ pub(crate) fn validation_only_effects<'a>(
     let short = |seen: &Seen| {
         matches!(Extent::of(&seen.candidate), Extent::Short(_)) && !seen.candidate.effect().of_the_body()
     };
-    // Zeros of torque sensors err on another path as pushes would.
+    // Wrong zeros of torque sensors cause errors on another path that look like pushes.
     let Baseline { data, validation, base } = &baseline;
     let pushed = pooled.seen.iter().any(short) && {
         let (better, left) = with_zeros(rule, base, (data, validation));
@@ -141,8 +141,8 @@ pub(crate) fn validation_only_effects<'a>(
     Ok((baseline, found))
 }
 
-/// The base model with what every arm may have (see [`Effect::baseline`](crate::effects::Effect::baseline)), and
-/// what it leaves on the validation set.
+/// The base model with what every arm may have (see [`Effect::baseline`](crate::effects::Effect::baseline)),
+/// and its residual on the validation set.
 fn with_zeros(rule: &Rule, base: &Fit, (data, validation): (&Data<'_>, &Data<'_>)) -> (Fit, Signals) {
     let context = Context::new(data, base, &base.residual, rule);
     let candidates: Vec<Candidate> = effects::all().iter().flat_map(|e| e.baseline(&context)).collect();
