@@ -43,7 +43,7 @@ pub enum Language {
 }
 
 impl Language {
-    /// What the names of its files end in.
+    /// The extension of its files.
     #[must_use]
     pub fn extension(self) -> &'static str {
         match self {

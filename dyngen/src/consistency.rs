@@ -1,7 +1,7 @@
 //! Whether a real arm can have given parameter values.
 //!
-//! Two things are asked: is the mass matrix B(q) positive definite at every pose, and, where a link's ten
-//! parameters are all given, is its pseudo-inertia matrix positive semi-definite, which is exactly the
+//! Two conditions are checked: is the mass matrix B(q) positive definite at every pose, and, where a link's
+//! ten parameters are all given, is its pseudo-inertia matrix positive semi-definite, which is exactly the
 //! condition for a distribution of mass to have them (Wensing, Kim and Slotine 2018).
 
 use crate::arm::{Arm, JointKind, MAX_JOINTS, Parameter, ParameterKind};
@@ -23,7 +23,7 @@ const ROUNDING: f64 = 1e-10;
 pub struct Possibility {
     /// Whether nothing speaks against the values.
     pub possible: bool,
-    /// What speaks against them.
+    /// The reasons why they are impossible.
     pub reasons: Vec<String>,
     /// The pose where B(q) is worst, rad or m.
     pub pose: Vec<f64>,
@@ -34,7 +34,7 @@ pub struct Possibility {
 }
 
 impl Possibility {
-    /// What speaks against the values of a file, each with what to take in their place.
+    /// The reasons against the values of a file, each with the values to use instead.
     #[must_use]
     pub fn warnings(&self, file: &Path) -> Vec<String> {
         let warning = |reason: &String| {
@@ -157,7 +157,7 @@ impl Search<'_> {
     }
 }
 
-/// Links whose parameters are all given and are those of no body, and rotors of negative inertia.
+/// Links whose parameters are all given but impossible for a body, and rotors of negative inertia.
 fn impossible_links(arm: &Arm, set: &ParameterSet, values: &[f64]) -> Vec<String> {
     let given = |p: Parameter| {
         let one = Some(crate::exact::rational::integer(1));

@@ -1,9 +1,9 @@
-//! What is wrong with an input, and where: every error of a file at once.
+//! Errors of an input with their positions: every error of a file at once.
 
 use std::fmt;
 use std::ops::Range;
 
-/// One thing wrong with an input file: where it stands, what it is, and what to do.
+/// One error of an input file: its position, its description, and what to do.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
     /// The file's name as the caller gave it.
@@ -51,13 +51,13 @@ impl fmt::Display for Diagnostics {
 
 impl std::error::Error for Diagnostics {}
 
-/// Whether a letter turns the text around it or ends its line where nobody sees it: a name with one reads otherwise than it is
-/// written ("Trojan Source"), and compilers refuse it.
+/// Whether a letter invisibly reverses the text around it or ends its line: a name with one is shown
+/// differently from its text ("Trojan Source"), and compilers refuse it.
 pub(crate) fn is_unseen(c: char) -> bool {
     matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// The message about such a letter, or a control character, that stands in something.
+/// The message about an invisible letter or a control character in a text.
 pub(crate) fn unseen(c: char) -> String {
     let what = if is_unseen(c) { "which turns or breaks the text around it" } else { "a control character" };
     format!("U+{:04X}, {what}: remove it", u32::from(c))

@@ -24,7 +24,7 @@ pub struct Samples<'a> {
     pub ddqr: &'a [f64],
     /// Joint torques.
     pub tau: &'a [f64],
-    /// What a transposed regressor is multiplied with.
+    /// The vector that a transposed regressor is multiplied with.
     pub e: &'a [f64],
     /// A wrench on the tool's frame in base axes, six numbers a sample: force, N, above moment, N·m.
     pub f: &'a [f64],
@@ -65,7 +65,7 @@ pub struct Evaluator {
     dof: usize,
     parameters: usize,
     angles: Angles,
-    /// What depends on the parameters alone, run once for all samples.
+    /// The computations that depend on the parameters alone, run once for all samples.
     preparation: Tape,
     tape: Tape,
 }

@@ -1,13 +1,13 @@
-//! Files that are read. Neither a pipe nor a device is one: reading it may never begin or never end.
+//! Regular files for reading. Pipes and devices are refused: reading one may never begin or never end.
 
 use std::fs::File;
 use std::io;
 use std::path::Path;
 
-/// Refuses what is neither a file nor a folder, before it is opened.
+/// Refuses a path that is neither a file nor a folder, before it is opened.
 ///
 /// # Errors
-/// What it is and what to do, and what the system says where there is nothing.
+/// The kind of the path and what to do, or the system's error if there is nothing.
 pub fn regular(path: &Path) -> io::Result<()> {
     let kind = std::fs::metadata(path)?.file_type();
     match kind.is_file() || kind.is_dir() {
@@ -39,7 +39,7 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
 /// The text of a file.
 ///
 /// # Errors
-/// As [`regular`], and where it is not UTF-8.
+/// The errors of [`regular`], and text that is not UTF-8.
 pub fn text(path: &Path) -> io::Result<String> {
     regular(path)?;
     std::fs::read_to_string(path)

@@ -1,4 +1,4 @@
-//! An arm with its exact parameter sets: where every function starts.
+//! An arm with its exact parameter sets, from which every function is made.
 
 use crate::arm::{Arm, Parameter};
 use crate::base::Sets;
@@ -106,9 +106,8 @@ impl Model {
         Ok(Model { angles: Angles::new(&arm), arm, symbols, sets, regroupings: Default::default() })
     }
 
-    /// An arm of which only kinematics is asked: no parameter set is derived but `full`, so that it is there
-    /// at once, whatever the arm's angles. Functions other than those of [`Function::is_kinematic`] are not
-    /// to be had.
+    /// An arm for kinematics only: no parameter set but `full` is derived, so that the model is made at once,
+    /// whatever the arm's angles. Only the functions of [`Function::is_kinematic`] are available.
     pub fn kinematic(arm: Arm) -> Model {
         let symbols = angle_symbols(&arm);
         let sets = Sets::underived(&arm, &symbols);
@@ -126,7 +125,7 @@ impl Model {
         &self.arm
     }
 
-    /// Of which angles functions take sine and cosine.
+    /// The angles whose sine and cosine functions use.
     pub fn angles(&self) -> &Angles {
         &self.angles
     }
@@ -256,7 +255,7 @@ impl Model {
         Ok(built)
     }
 
-    /// The sums that a set's parameters stand for, in numbers.
+    /// The sums of a set's parameters, in numbers.
     pub fn sums(&self, set: &ParameterSet) -> Vec<Sum> {
         let sum = |terms: &Combination| terms.iter().map(|(p, c)| (*p, self.sets.field.value(c))).collect();
         set.parameters.iter().map(|p| sum(&p.terms)).collect()

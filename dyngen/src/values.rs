@@ -116,7 +116,7 @@ impl Values {
     /// those of the same arm under another gravity, say.
     ///
     /// # Errors
-    /// Every name that is missing or means nothing here.
+    /// Every name that is missing or unknown.
     pub fn of_set(&self, model: &Model, set: &ParameterSet) -> Result<Vec<f64>, Diagnostics> {
         let names = set.names();
         let given = |name: &String| self.by_name.contains_key(name);

@@ -1,10 +1,9 @@
 //! Both halves of a dependence of columns, certified at random points of the prime field by the Lagrangian
 //! itself.
 //!
-//! That the kept columns are independent is certain where a minor of their values does not vanish modulo the
-//! prime. That a relation holds is as certain as a proof of a function is: a wrong one is a polynomial that
-//! is not zero and vanishes at a random point with probability below 2⁻⁵⁴; as many points are taken as there
-//! are columns.
+//! The kept columns are certainly independent if a minor of their values does not vanish modulo the prime. A
+//! relation is as certain as the proof of a function: a wrong one is a polynomial that is not zero and
+//! vanishes at a random point with probability below 2⁻⁵⁴; as many points are taken as there are columns.
 
 use super::steps::Sizes;
 use crate::arm::{Arm, Drive};
@@ -69,7 +68,7 @@ struct Point<'a> {
     drives: Vec<Drive>,
     /// Sine and cosine of each joint's angle.
     angles: Vec<(Fp, Fp)>,
-    /// Of the coordinates.
+    /// Positions of the coordinates.
     positions: Vec<Fp>,
     velocities: Vec<Fp>,
     /// a, d, rotor ratio and b of each joint, where they are variables.

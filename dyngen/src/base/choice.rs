@@ -1,9 +1,9 @@
 //! Which base columns to keep: those whose regressor is the cheapest.
 //!
 //! A few rules of choice give a start. From each, a kept column is exchanged for one that depends on it as
-//! long as that makes the code cheaper. All columns are built once, as one graph; what a choice costs is
-//! counted in it. Functions of parameter values do not depend on the choice: they sum the parameters up in
-//! their own way.
+//! long as that makes the code cheaper. All columns are built once, as one graph, in which the cost of a
+//! choice is counted. Functions of parameter values do not depend on the choice: they sum the parameters up
+//! in their own way.
 
 use super::plain::full_set;
 use super::preference::Preference;
@@ -31,10 +31,11 @@ pub struct Candidate {
     pub operations: usize,
 }
 
-/// The cheapest base columns, and what the search from every rule found; of equal costs the first rule wins.
+/// The cheapest base columns, and the result of the search from every rule; of equal costs the first rule
+/// wins.
 ///
-/// Where angles are kept as symbols eliminations are slow, and the first rule's columns are taken as they
-/// are.
+/// Where angles are kept as symbols eliminations are slow, and the first rule's columns are taken without a
+/// search.
 ///
 /// # Errors
 /// Those of `eliminate`.

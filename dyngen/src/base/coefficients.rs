@@ -2,15 +2,15 @@
 //! matrix with one row for each function of the motion and one column for each parameter.
 //!
 //! A linear functional on functions of all joints' motions is a sum of products of functionals, one for each
-//! joint. What the columns of link i are under the functionals of the joints up to i is determined by what 32
-//! monomials of the link's motion (velocities, their products, gravity, height) are. Their values span a
-//! space that a step from link to link maps on, whatever number of joints follows. Take for each joint one
-//! functional that keeps constants, the mean over its turn at rest, and otherwise such as vanish on
-//! constants. Then the last joint whose functional vanishes on constants sorts the rows into blocks: its own
-//! link's columns span at most eleven dimensions (and five for each motor that turns with several joints),
-//! and the links behind it see what the mean makes of them. So the rank is a sum over the joints, and the
-//! work grows with the number of joints, not with the number of terms. That the rows say the truth is
-//! certified in `certificate.rs`.
+//! joint. The values of the columns of link i under the functionals of the joints up to i are determined by
+//! the values of 32 monomials of the link's motion (velocities, their products, gravity, height). Their
+//! values span a space that a step from link to link maps on, whatever number of joints follows. Take for
+//! each joint one functional that keeps constants, the mean over its turn at rest, and otherwise such as
+//! vanish on constants. Then the last joint whose functional vanishes on constants sorts the rows into
+//! blocks: its own link's columns span at most eleven dimensions (and five for each motor that turns with
+//! several joints), and the links behind it contribute their means. So the rank is a sum over the joints, and
+//! the work grows with the number of joints, not with the number of terms. The rows are certified in
+//! `certificate.rs`.
 
 use super::preference::Preference;
 pub use super::steps::Sizes;
@@ -82,8 +82,8 @@ struct Link<'a, 'f> {
 impl<'f> Steps<'f> {
     /// A basis in reduced form of the space that some values span, in the order of preference.
     ///
-    /// Where the space holds a unit vector, which a reduction modulo the prime shows, it is taken as it is,
-    /// so that no fraction is made of it.
+    /// Where the space holds a unit vector, which a reduction modulo the prime shows, it is taken unchanged,
+    /// so that it gets no fractions.
     fn basis(&self, values: Vec<Values>, order: Vec<usize>) -> Result<Vec<Values>, Unproven> {
         let rows: Vec<SparseRow> = values
             .iter()

@@ -24,7 +24,7 @@ pub(super) struct CoupledMotor {
     row: Vec<(usize, Rational)>,
 }
 
-/// What is carried of a motor: variables of the motion before a joint, or what a step makes of them.
+/// The carried quantities of a motor: variables of the motion before a joint, or their values after a step.
 #[derive(Clone, Debug)]
 pub(super) struct Carried<V> {
     /// μ so far, up to the motor's own joint; then zero.
@@ -49,7 +49,7 @@ impl CoupledMotor {
         (0..arm.dof()).filter_map(of).collect()
     }
 
-    /// What a joint makes of what was carried to it, where the link before it turns at `omega` about its
+    /// The step of a joint on the carried quantities, where the link before it turns at `omega` about its
     /// axis.
     pub(super) fn step(
         &self,

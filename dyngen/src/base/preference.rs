@@ -6,9 +6,9 @@ use std::fmt;
 /// A rule for what a base set keeps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Preference {
-    /// Of the two inertias across the joint axis the second stays, not the first.
+    /// Keeps the second of the two inertias across the joint axis, not the first.
     pub second_across: bool,
-    /// Of two links the outer one keeps, not the inner one.
+    /// Keeps the parameter of the outer one of two links, not of the inner one.
     pub outer: bool,
 }
 

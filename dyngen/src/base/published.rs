@@ -1,4 +1,4 @@
-//! A published parameter set, checked: exact or not, and what it loses.
+//! The check of a published parameter set: exact or not, and the parameters that it loses.
 
 use super::plain::{combination_text, unexamined};
 use crate::arm::{Arm, Parameter};

@@ -50,8 +50,8 @@ pub struct Sets {
     pub sets: Vec<ParameterSet>,
     /// The dependence of the columns for the numbers in the file.
     pub minimal: Dependence,
-    /// Of a standard table with general twists the chain with frames on its joints and the dependence of its
-    /// columns, which need no fractions.
+    /// For a standard table with general twists: the chain with frames on its joints, and the dependence of
+    /// its columns, which need no fractions.
     pub on_joints: Option<(Arm, Dependence)>,
     /// Rows that span those of the Lagrangian for all the arm's parameters, those declared zero too.
     pub(super) rows: Vec<SparseRow>,

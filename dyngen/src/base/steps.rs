@@ -1,9 +1,8 @@
-//! What one joint makes of functionals of the motion before it: the step from link to link on a motion's
-//! monomials.
+//! The step of one joint on functionals of the motion before it: from link to link on a motion's monomials.
 //!
 //! A motion is expressed in axes whose z is the link's own joint axis, in the standard convention too: there
 //! the twist behind the joint is only in the link's columns and in the next step. Else every monomial would
-//! be mixed by it, and elimination makes fractions of that.
+//! be mixed by it, and the elimination would get fractions.
 
 use super::coupled::{CARRIED, Carried, CoupledMotor};
 use crate::arm::{Arm, Convention};
@@ -337,7 +336,7 @@ impl<'f> Steps<'f> {
         (0..self.width()).map(lift).collect()
     }
 
-    /// Columns of a link: its eleven and those of which coupled motors' are made.
+    /// Number of columns of a link: its eleven, and those from which the columns of coupled motors are made.
     pub(super) fn width(&self) -> usize {
         LINK + self.pending.len()
     }
@@ -356,7 +355,7 @@ impl<'f> Steps<'f> {
 }
 
 impl Step<'_, '_> {
-    /// What the joint's functionals make of values: for each the next motion's values and the rotor's.
+    /// Applies the joint's functionals to values: for each, the next motion's values and the rotor's.
     pub(super) fn images(&self, values: &Values) -> BTreeMap<Functional, (Values, Constant)> {
         let field = self.steps.field;
         let zero = || field.rational(rational::integer(0));

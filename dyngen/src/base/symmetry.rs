@@ -1,5 +1,5 @@
-//! What each declared symmetry removed: the arm's file says that a parameter is zero, and this says what that
-//! saves.
+//! The saving of each declared symmetry: the arm's file declares a parameter zero, and this is the number of
+//! removed parameters.
 
 use super::coefficients;
 use super::preference::Preference;
@@ -8,7 +8,7 @@ use crate::arm::{Arm, Parameter};
 use crate::exact::elimination::{self, SparseRow, Unproven};
 use crate::parameters::Combination;
 
-/// What the torques would show of a parameter that is declared zero, in addition to those that are kept.
+/// The effect on the torques of a parameter that is declared zero, in addition to the kept parameters.
 #[derive(Clone, Debug)]
 pub enum Removed {
     /// Nothing: its column is zero, with or without the symmetry.
@@ -20,12 +20,12 @@ pub enum Removed {
     Term(Combination),
 }
 
-/// A declared symmetry with what it removed.
+/// A declared symmetry with its saving.
 #[derive(Clone, Debug)]
 pub struct Symmetry {
     /// The parameter that is declared zero.
     pub parameter: Parameter,
-    /// What that removed.
+    /// The saving of this declaration.
     pub removed: Removed,
 }
 

@@ -1,10 +1,10 @@
 //! The rows of an arm some of whose joints follow others: the Lagrangian at poses and motions with exact
 //! numbers.
 //!
-//! Functionals of one joint each, of which [`super::coefficients`] makes its rows, are not enough where joints
-//! move together. Any functions span the space of their values at enough points, so rows are taken at poses
-//! whose sines and cosines are fractions, until there are as many independent ones as at random points
-//! modulo the prime. That the rows say the truth is certified as always.
+//! Functionals of one joint each, of which [`super::coefficients`] makes its rows, are not enough where
+//! joints move together. Any functions span the space of their values at enough points, so rows are taken at
+//! poses whose sines and cosines are fractions, until there are as many independent ones as at random points
+//! modulo the prime. The rows are certified like all others.
 
 use super::certificate;
 use super::steps::Sizes;
@@ -77,10 +77,10 @@ pub(super) fn all_rows(
 struct Point {
     /// Sines and cosines, as many as there may be free angles.
     circle: Vec<(Rational, Rational)>,
-    /// Of the coordinates.
+    /// Positions of the coordinates.
     positions: Vec<Rational>,
     velocities: Vec<Rational>,
-    /// Of each joint, where they are variables.
+    /// Sizes of each joint, if they are variables.
     sizes: Option<Vec<JointSizes>>,
 }
 

@@ -1,5 +1,5 @@
-//! What an angle of an arm is, decided once: of which sums of joints' angles functions take sine and cosine, and how
-//! each is made of the coordinates.
+//! The angles of an arm, decided once: the sums of joints' angles whose sine and cosine functions use, and
+//! how each is made of the coordinates.
 //!
 //! A joint's angle is its ratio times the coordinate that it moves with and a constant. Functions take the angles of
 //! the joints that move on their own, of those that follow them, and sums across parallel axes, where only sums
@@ -17,7 +17,7 @@ use std::collections::BTreeSet;
 /// The angles of an arm.
 #[derive(Clone, Debug)]
 pub struct Angles {
-    /// Of each joint of the chain.
+    /// The angle of each joint of the chain.
     joints: Vec<JointAngle>,
     taken: Vec<JointSum>,
 }
@@ -27,13 +27,13 @@ pub struct Angles {
 pub struct JointAngle {
     /// Index of q among the coordinates.
     pub coordinate: usize,
-    /// Of a joint that follows another one; none where q is the joint's own.
+    /// Ratio of a joint that follows another one; `None` if q is the joint's own.
     pub ratio: Option<f64>,
     /// Theta where it is no multiple of pi/2, and the offset of a joint that follows another one, rad.
     pub offset: f64,
     /// The quarter turns of theta, which are not in the angle.
     quarters: u8,
-    /// As a multiple of another angle; none where it follows a joint that slides.
+    /// The angle as a multiple of another angle; `None` if it follows a prismatic joint.
     multiple: Option<Multiple>,
 }
 
@@ -83,7 +83,7 @@ impl Angles {
         &self.joints[joint]
     }
 
-    /// What is added to the coordinates of a sum, rad.
+    /// The constant that is added to the coordinates of a sum, rad.
     pub fn offset(&self, sum: JointSum) -> f64 {
         sum.value(|joint| self.joints[joint].offset)
     }
@@ -122,8 +122,8 @@ impl Angles {
         self.folded(sum).sin_cos(b)
     }
 
-    /// A sum of the chain's angles as one of joints that move on their own, where it is one but for quarter turns:
-    /// with ratios of one, as in a parallelogram. Any other sum stays what it is.
+    /// A sum of the chain's angles as a sum of independent joints, if it is one except for quarter turns:
+    /// with ratios of one, as in a parallelogram. Any other sum is not changed.
     fn folded(&self, sum: JointSum) -> Folded {
         let itself = Folded { sum: Some(sum), negative: false, quarters: 0 };
         self.as_own_joints(sum).unwrap_or(itself)

@@ -43,7 +43,7 @@ pub struct FunctionGraph {
 }
 
 impl FunctionGraph {
-    /// What it costs, without what is prepared of the parameters alone.
+    /// Operations of the function, without those that are prepared from the parameters alone.
     pub fn operations(&self) -> Operations {
         self.graph.operations_when_prepared(&self.outputs)
     }
@@ -55,25 +55,25 @@ impl FunctionGraph {
         FunctionGraph { graph, outputs, ..self.clone() }
     }
 
-    /// What it takes: the function's arguments, without the parameters where their values are baked in.
+    /// The function's arguments, without the parameters if their values are baked in.
     pub fn arguments(&self) -> impl Iterator<Item = Argument> + '_ {
         let baked = self.baked;
         self.function.arguments().iter().copied().filter(move |a| !(baked && *a == Argument::Parameters))
     }
 }
 
-/// What functions are built from: an arm with what is known exactly of it.
+/// The data from which functions are built: an arm with its exact properties.
 #[derive(Clone, Copy, Debug)]
 pub struct Subject<'a> {
     /// The arm.
     pub arm: &'a Arm,
-    /// Of which angles functions take sine and cosine.
+    /// The angles whose sine and cosine functions use.
     pub angles: &'a Angles,
     /// The arm's constant angles that are kept as symbols.
     pub symbols: &'a AngleSymbols,
     /// The field of its constants.
     pub field: &'a ConstantField,
-    /// How all its parameters depend on those of the minimal set.
+    /// Dependence of all parameters on those of the minimal set.
     pub minimal: &'a Dependence,
 }
 
@@ -161,7 +161,7 @@ struct Parts<'a> {
     form: Form,
     elements: ArmElements<Expr>,
     chain: Chain,
-    /// Where the file's frames lie in the chain's.
+    /// Poses of the file's frames in those of the chain.
     geometry: Vec<LinkGeometry<Expr>>,
     /// None where the function takes no body of a link.
     bodies: Vec<LinkBody>,

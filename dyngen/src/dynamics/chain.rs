@@ -75,7 +75,7 @@ pub fn reversed(arm: &Arm) -> Vec<bool> {
 /// as many origins as possible coincide.
 fn slid(arm: &Arm, origins: Origins) -> Vec<bool> {
     let revolute = |i: usize| arm.joints[i].kind == JointKind::Revolute;
-    // What it costs to reach the next origin: along the common normal, along this axis, along the next one.
+    // The cost to reach the next origin: along the common normal, along this axis, along the next one.
     let cost = |i: usize, here: bool, next: bool| -> usize {
         let normal = lengths(arm, i).iter().any(|length| !length.is_zero());
         let along = revolute(i) && !arm.joints[i].d.is_zero() && !here;
@@ -118,7 +118,8 @@ fn lengths(arm: &Arm, joint: usize) -> [&crate::exact::rational::Rational; 2] {
     [&row.a, &row.b]
 }
 
-/// Where an origin lies on its axis if two places cost the same: nearer to the link before or to the next.
+/// The position of an origin on its axis if two positions cost the same: nearer to the link before or to the
+/// next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Origins {
     /// At the common normal with the axis before.

@@ -1,11 +1,11 @@
 //! The Coriolis matrix of Christoffel symbols, for which Ḃ − 2C is skew-symmetric.
 //!
-//! A point of the arm at x moves by ẋ = Σ Jⱼ q̇ⱼ, and ∂Jⱼ/∂qₖ = ∂²x/∂qⱼ∂qₖ is symmetric in j and k, so
-//! C = Σ m JᵀJ̇ over all points is the matrix of Christoffel symbols. With r from the origin of a frame,
-//! Jⱼ = yⱼ + zⱼ×r and J̇ⱼ = ẏⱼ + żⱼ×r + zⱼ×ṙ, so in addition to a composite's mass, first moment s and second
-//! moments only Q = Σ m ṙ and K = Σ m ṙ rᵀ are needed. One pass inwards carries them; nothing is
-//! differentiated. Within a stage of parallel axes a coordinate turns one link and only displaces what is
-//! beyond, by t = z×p at its reach p.
+//! A point of the arm at x moves by ẋ = Σ Jⱼ q̇ⱼ, and ∂Jⱼ/∂qₖ = ∂²x/∂qⱼ∂qₖ is symmetric in j and k, so C = Σ
+//! m JᵀJ̇ over all points is the matrix of Christoffel symbols. With r from the origin of a frame, Jⱼ = yⱼ +
+//! zⱼ×r and J̇ⱼ = ẏⱼ + żⱼ×r + zⱼ×ṙ, so in addition to a composite's mass, first moment s and second moments
+//! only Q = Σ m ṙ and K = Σ m ṙ rᵀ are needed. One pass inwards carries them; nothing is differentiated.
+//! Within a stage of parallel axes a coordinate turns one link and only displaces the bodies beyond it, by t
+//! = z×p at its reach p.
 
 use super::body::{Vector, ZERO};
 use super::composite::{add_coupled, pieces, unit_momentum, with_mass, z_cross};

@@ -1,8 +1,9 @@
 //! Joints that follow others, in graphs: the full chain's functions become those of the coordinates.
 //!
 //! With q_chain = G·q + o the chain's torques and momenta give Gᵀ·τ, its mass and Coriolis matrices GᵀMG and
-//! GᵀCG (Christoffel symbols are those of the coordinates because G is constant), and what is linear in
-//! velocities J·G. Inputs of joints that follow are replaced by those of the joints that they follow.
+//! GᵀCG (Christoffel symbols are those of the coordinates because G is constant), and quantities that are
+//! linear in velocities give J·G. Inputs of joints that follow are replaced by those of the joints that they
+//! follow.
 
 use super::angles::Angles;
 use crate::arm::{Arm, Drive};
@@ -56,7 +57,7 @@ impl<'a> Followers<'a> {
         sums
     }
 
-    /// The chain's rates or accelerations of those of the coordinates.
+    /// The chain's rates or accelerations from those of the coordinates.
     pub fn of_chain(&self, b: &Builder, coordinates: &[Expr]) -> Vec<Expr> {
         let of = |drive: &Drive| b.mul(&b.constant(&drive.ratio), &coordinates[drive.coordinate]);
         self.drives.iter().map(of).collect()
@@ -80,7 +81,7 @@ impl<'a> Followers<'a> {
         (b.finish(), outputs)
     }
 
-    /// An input of the chain by those of the coordinates.
+    /// An input of the chain in terms of those of the coordinates.
     fn input(&self, b: &Builder, input: Input) -> Expr {
         let rate = |of: fn(usize) -> Input, joint: usize| {
             let drive = &self.drives[joint];

@@ -8,7 +8,7 @@ pub fn solve_symmetric(b: &Builder, matrix: &[Expr], right: &[Expr]) -> Vec<Expr
     Factors::of(b, matrix, right.len()).solve(b, right)
 }
 
-/// As [`solve_symmetric`], for several right-hand sides.
+/// Like [`solve_symmetric`], for several right-hand sides.
 pub fn solve_symmetric_each(b: &Builder, matrix: &[Expr], n: usize, right: &[&[Expr]]) -> Vec<Vec<Expr>> {
     let factors = Factors::of(b, matrix, n);
     right.iter().map(|right| factors.solve(b, right)).collect()

@@ -1,4 +1,4 @@
-//! The functions of an arm: what they take and give.
+//! The functions of an arm: their arguments and results.
 
 use super::table::{COUNT, Row, TABLE};
 use std::fmt;
@@ -175,7 +175,7 @@ impl Argument {
         }
     }
 
-    /// What it is, with its unit.
+    /// The meaning of the argument, with its unit.
     pub fn meaning(self) -> &'static str {
         match self {
             Argument::Positions => "joint positions, rad (m where prismatic)",
@@ -221,7 +221,7 @@ impl Argument {
     }
 }
 
-/// What the cost of a function depends on.
+/// The kind of a function, on which its cost depends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// On the form of the recursion and on how it sums the parameters up.
@@ -279,12 +279,12 @@ impl Function {
         self.row().name
     }
 
-    /// What stands before the number of an entry where results are columns of a table: `tau`, `Y`.
+    /// The letters before the number of an entry if results are columns of a table: `tau`, `Y`.
     pub fn letter(self) -> &'static str {
         self.row().letter
     }
 
-    /// What it computes, and what it returns with the unit: one sentence each.
+    /// The quantity that it computes, and its result with the unit: one sentence each.
     pub fn meaning(self) -> (&'static str, &'static str) {
         (self.row().what, self.row().returns)
     }
@@ -305,7 +305,7 @@ impl Function {
         (rows.length(n, p), columns.length(n, p))
     }
 
-    /// What it takes.
+    /// The arguments of the function.
     pub fn arguments(self) -> &'static [Argument] {
         self.row().arguments
     }

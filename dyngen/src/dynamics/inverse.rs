@@ -9,7 +9,7 @@ use crate::arm::JointKind;
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
 
-/// What a coordinate of a stage feels.
+/// The generalised force on a coordinate of a stage.
 #[derive(Clone, Copy, Debug)]
 pub struct Felt {
     /// The coordinate's torque or force.
@@ -29,7 +29,7 @@ pub struct Passes {
     pub torques: Vec<Expr>,
     /// How the frames of each stage move.
     pub motions: Vec<StageMotion>,
-    /// What the coordinates of each stage feel.
+    /// The generalised forces on the coordinates of each stage.
     pub felt: Vec<Vec<Felt>>,
 }
 
@@ -167,7 +167,7 @@ fn prismatic(
 fn body_wrench(b: &Builder, body: &LinkBody, link: &LinkMotion) -> Wrench {
     let moments = &body.moments;
     let mut wrench = Wrench::NONE;
-    // First moments across the axis need U's diagonal as it is.
+    // First moments across the axis need U's diagonal unchanged.
     let diagonal_unused = moments.first[0] == Expr::ZERO && moments.first[1] == Expr::ZERO;
     for (entry, value) in moments.entries().into_iter().enumerate() {
         if value != Expr::ZERO {

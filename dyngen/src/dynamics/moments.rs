@@ -35,7 +35,8 @@ impl<V: Clone> Moments<V> {
         Moments { mass: v[0].clone(), first: three(1), square: three(4), mixed: three(7) }
     }
 
-    /// Of a body with the ten inertial parameters m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz; `half` is ½.
+    /// The moments of a body with the ten inertial parameters m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz;
+    /// `half` is ½.
     pub fn of_parameters<A: Algebra<Value = V>>(alg: &A, half: &V, parameters: &[V; ENTRIES]) -> Self {
         let [m, x, y, z, xx, xy, xz, yy, yz, zz] = parameters.clone();
         // J = ½ tr(I) − I

@@ -1,6 +1,6 @@
 //! Momentum, kinetic energy, and the velocity terms that momentum gives without a matrix.
 //!
-//! Of an arm at rest the Newton–Euler recursion makes of accelerations what momentum is of velocities: its
+//! For an arm at rest, the Newton–Euler recursion maps accelerations as momentum maps velocities: its
 //! accelerations are then velocities, its wrenches momenta p and h.
 
 use super::body::Vector;
@@ -76,7 +76,7 @@ pub fn coriolis_transpose_times_velocity(
     result
 }
 
-/// The angular velocity where velocities stand for accelerations.
+/// The angular velocity if velocities are used as accelerations.
 fn turning(b: &Builder, spin: &Spin) -> Vector {
     std::array::from_fn(|axis| spin.alpha(b, axis))
 }

@@ -8,7 +8,7 @@ use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
 use crate::lagrangian::elements::turn_z;
 
-/// What drives the recursion in addition to the joints' positions.
+/// The inputs of the recursion in addition to the joints' positions.
 #[derive(Clone, Debug)]
 pub struct Drive {
     /// Velocities q̇.

@@ -1,4 +1,4 @@
-//! The regressor: each parameter's wrench projected onto what each coordinate moves.
+//! The regressor: each parameter's wrench projected onto the motion of each coordinate.
 
 use super::body::{Vector, ZERO};
 use super::chain::LinkGeometry;
@@ -48,14 +48,14 @@ impl Turn {
     }
 }
 
-/// What the columns are made of.
+/// The data from which the columns are made.
 #[derive(Clone, Copy, Debug)]
 pub struct Columns<'a> {
     /// The parameter set.
     pub set: &'a ParameterSet,
     /// The field of its factors.
     pub field: &'a ConstantField,
-    /// Where the file's frames lie in the chain's.
+    /// Poses of the file's frames in those of the chain.
     pub links: &'a [LinkGeometry<Expr>],
     /// Whether forces are turned back to where their origin is at rest, not the axes' velocities outwards.
     pub forces_home: bool,
@@ -309,8 +309,8 @@ fn tensor_moment(b: &Builder, tensor: &[Vector; 3], motion: &LinkMotion) -> Vect
 }
 
 /// The torques of a unit of a rotor's inertia: on its own joint k·(k q̈ + z·α of the link before), and on
-/// that link the rate of the rotor's own angular momentum, k·(q̈ z + q̇ ω×z). Where the motor turns with
-/// several joints its velocity stands for q̇, and its torque acts on each of them.
+/// that link the rate of the rotor's own angular momentum, k·(q̈ z + q̇ ω×z). If the motor turns with several
+/// joints, its velocity replaces q̇, and its torque acts on each of them.
 fn rotor_column(
     b: &Builder,
     chain: &Chain,

@@ -1,4 +1,4 @@
-//! The inertial parameters in the form that the recursions like best.
+//! The inertial parameters in the form that is cheapest for the recursions.
 //!
 //! Torques depend on a parameter set only through as many sums as its rank. Which sums is free: each is
 //! carried by one column of the dynamics, and the columns of second moments in the frames of the chain are
@@ -18,7 +18,7 @@ use crate::graph::{Builder, Expr};
 use crate::lagrangian::elements::{ArmElements, Source};
 use crate::parameters::{Combination, ParameterSet, minimal_coordinates};
 
-/// What a link brings into the dynamics.
+/// The contribution of a link to the dynamics.
 #[derive(Clone, Debug)]
 pub struct LinkBody {
     /// Moments in the link's frame.
@@ -46,14 +46,14 @@ enum Column {
     EndMass(usize),
     Rotor(usize),
     Flywheel(usize),
-    /// A parameter of the set as it is.
+    /// A parameter of the set, unchanged.
     Given(usize),
 }
 
 /// A rule for which columns carry the sums.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Order {
-    /// Where the origins lie on their axes.
+    /// The positions of the origins on their axes.
     pub origins: Origins,
     /// Masses at the ends of links, not first moments along the axes.
     pub masses: bool,
@@ -236,7 +236,7 @@ impl<'a> Map<'a> {
         self.of_moments(link, &Moments::from_entries(&v))
     }
 
-    /// The parameters of the file that a column stands for.
+    /// The parameters of the file that a column represents.
     fn parameters(&self, column: Column, before_stage: &[Option<usize>], set: &ParameterSet) -> Combination {
         let f = self.field;
         match column {
@@ -271,7 +271,7 @@ fn stages_of_links(arm: &Arm) -> (Vec<usize>, Vec<Option<usize>>) {
     stages.flat_map(|(s, stage)| stage.clone().map(move |_| (s, stage.start.checked_sub(1)))).unzip()
 }
 
-/// What is known exactly of how an arm's columns depend.
+/// The exact dependence of an arm's columns.
 #[derive(Clone, Copy, Debug)]
 pub struct Known<'a> {
     /// Dependences of the arm's own parameters.
@@ -292,7 +292,7 @@ impl Regrouping {
         order: Order,
     ) -> Regrouping {
         let map = Map::new(arm, symbols, field, order.origins);
-        // The chain's frames are those of both tables: moments in them lead from one to the other.
+        // The chain's frames are those of both tables: moments in them convert from one to the other.
         let on_joints = known.on_joints.map(|(chain, d)| (Map::new(chain, symbols, field, order.origins), d));
         let height = known.on_joints.map_or(known.minimal, |(_, d)| d).kept.len();
         let coordinates_of = |sum: &Combination| match &on_joints {

@@ -1,4 +1,4 @@
-//! How frames move: ω, and the accelerations of their points.
+//! The motion of frames: ω, and the accelerations of their points.
 
 use super::body::Vector;
 use crate::exact::algebra::Algebra;

@@ -18,7 +18,7 @@ pub const STRAIGHT: SinCos = (Expr::ZERO, Expr::ONE);
 /// The form of a recursion: all forms give the same function, which is cheaper depends on the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Form {
-    /// Where origins lie on their axes.
+    /// The positions of origins on their axes.
     pub origins: Origins,
     /// Within a stage vectors are turned from link to link, not through the frame before the stage.
     pub link_to_link: bool,
@@ -60,7 +60,8 @@ pub struct Member {
     pub reach: Vector,
     /// Gear ratio of its rotor.
     pub ratio: Option<Expr>,
-    /// Where its motor turns with several joints: how fast about the chain's z for a unit of each joint's velocity.
+    /// If its motor turns with several joints: its velocity about the chain's z for a unit of each joint's
+    /// velocity.
     pub coupled: Option<Vec<(usize, Expr)>>,
 }
 

@@ -1,11 +1,11 @@
-//! The one table of functions: their names, shapes and arguments, and what they compute, in words.
+//! The one table of functions: their names, shapes and arguments, and a sentence about each.
 
 use super::function::Argument::{self, *};
 use super::function::Function::{self, *};
 use super::function::Kind;
 use super::function::Size::{self, Fixed, Joints, Parameters as ByParameter};
 
-/// What is known of a function in addition to its equations.
+/// The description of a function in addition to its equations.
 pub(super) struct Row {
     pub(super) function: Function,
     /// On the command line and in the emitted code.
@@ -15,9 +15,9 @@ pub(super) struct Row {
     pub(super) size: (Size, Size),
     pub(super) arguments: &'static [Argument],
     pub(super) kind: Kind,
-    /// What it computes.
+    /// The quantity that the function computes.
     pub(super) what: &'static str,
-    /// What it returns, with the unit.
+    /// The result, with the unit.
     pub(super) returns: &'static str,
 }
 

@@ -1,10 +1,10 @@
-//! How a frame moves under forces on it (Khatib 1987).
+//! The motion of a frame under forces on it (Khatib 1987).
 
 use super::forward;
 use crate::exact::algebra::Algebra;
 use crate::graph::{Builder, Expr};
 
-/// What a wrench on the tool's frame does.
+/// The effect of a wrench on the tool's frame.
 pub(super) struct Task {
     /// B⁻¹·Jᵀ, n × 6.
     accelerations: Vec<Expr>,

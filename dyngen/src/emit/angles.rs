@@ -1,4 +1,4 @@
-//! What functions take of joint positions: sines and cosines, all angles of a function at once.
+//! The sines and cosines of joint positions for functions, for all angles of a function at once.
 
 use super::lanes::{lane_name, used};
 use crate::arm::{Arm, Joint, JointKind};

@@ -1,4 +1,4 @@
-//! The arm over one step of time, with its linearisation: what a controller with a horizon asks for, composed of the file's
+//! The arm over one step of time, with its linearisation, for predictive controllers; composed of the file's
 //! own functions.
 
 use super::Options;

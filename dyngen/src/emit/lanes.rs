@@ -1,4 +1,4 @@
-//! What a function reads, and what its values are called in the code.
+//! The inputs of a function, and the names of its values in the code.
 
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::Argument;

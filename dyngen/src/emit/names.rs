@@ -1,4 +1,4 @@
-//! How the things of an arm are called in languages that have no modules.
+//! Names of an arm's items in languages without modules.
 
 use crate::dynamics::Function;
 

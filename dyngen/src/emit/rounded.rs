@@ -1,4 +1,5 @@
-//! What the rounded constants of a file stand for, as lines of its head: `dyngen verify` computes with the exact numbers.
+//! The exact numbers of a file's rounded constants, as lines of its head: `dyngen verify` computes with the
+//! exact numbers.
 
 use super::Parts;
 use crate::dynamics::FunctionGraph;

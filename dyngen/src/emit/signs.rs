@@ -1,7 +1,7 @@
 //! Which values the emitted code holds with the other sign.
 //!
-//! A difference costs the same either way round, so that of neighbours in a vector of results every second
-//! can be minus what was computed. LLVM otherwise joins neighbours into vectors of two and follows their
+//! A difference costs the same in both directions, so every second neighbour in a vector of results can be
+//! the negative of the computed value. LLVM otherwise joins neighbours into vectors of two and follows their
 //! terms back through the function, where they lie scattered: the shuffles cost more than is saved, half of
 //! the inverse dynamics' time again.
 

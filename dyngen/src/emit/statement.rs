@@ -1,4 +1,4 @@
-//! A function's graph as statements, one for each node: what every language's code is printed from.
+//! A function's graph as statements, one for each node: the code of every language is printed from them.
 
 use super::signs;
 use crate::dynamics::function::{Argument, Size};

@@ -1,4 +1,4 @@
-//! What a formula needs of the things it computes with, so that each formula is written once.
+//! The operations that a formula needs, so that each formula is written once for every kind of number.
 //!
 //! The Lagrangian is one function; run over polynomials it gives the exact coefficients, run over jets modulo
 //! a prime it gives the equations of motion at a point.

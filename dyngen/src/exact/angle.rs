@@ -1,4 +1,4 @@
-//! Angles that are exact where the file says so.
+//! Angles, exact if the file gives them exactly.
 
 use super::rational::{self, Rational};
 use num_traits::{Signed, Zero};

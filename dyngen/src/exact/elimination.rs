@@ -56,8 +56,8 @@ pub fn dependence(
     if rows.iter().all(|row| holds(field, row, &relations)) { Ok(dependence) } else { Err(Unproven) }
 }
 
-/// As [`dependence`], but that the relations hold on every row is left to the caller's proof: where coefficients
-/// are fractions of many symbols, what clears their denominators is long.
+/// Like [`dependence`], but the caller proves that the relations hold on every row: if coefficients are
+/// fractions of many symbols, their common denominator is long.
 ///
 /// # Errors
 /// [`Unproven`] where the prime divides a denominator of the matrix.

@@ -79,7 +79,7 @@ impl<C> Polynomial<C> {
     }
 }
 
-/// What the square of a variable is.
+/// The rule for the square of a variable.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Square<C> {
     /// Nothing simpler.
@@ -112,7 +112,7 @@ where
     /// This ring with more variables after its own.
     ///
     /// # Panics
-    /// As [`PolynomialRing::new`].
+    /// Those of [`PolynomialRing::new`].
     #[must_use]
     pub fn extended(&self, more: Vec<Square<C>>) -> Self {
         let mut squares = self.squares.clone();
@@ -141,7 +141,7 @@ where
         self.term(Monomial::default(), value)
     }
 
-    /// Puts a monomial into normal form and appends what it becomes.
+    /// Puts a monomial into normal form and appends the result.
     fn reduce_into(&self, monomial: Monomial, coefficient: C, out: &mut Vec<(Monomial, C)>) {
         let reducible = monomial.powers().find(|(v, e)| *e > 1 && self.squares[*v] != Square::Free);
         let Some((variable, exponent)) = reducible else {

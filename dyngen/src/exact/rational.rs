@@ -1,4 +1,4 @@
-//! Rational numbers, and decimals read as what they say: 0.305 is 61/200.
+//! Rational numbers, and decimals that are read exactly: 0.305 is 61/200.
 
 use dashu_int::IBig;
 use dashu_ratio::RBig;
@@ -81,7 +81,7 @@ pub fn ratio(p: impl Into<IBig>, q: impl Into<IBig>) -> Rational {
     Rational::from_parts_signed(p.into(), q.into())
 }
 
-/// What it is divided by, above zero.
+/// The denominator, above zero.
 pub fn denominator(value: &Rational) -> IBig {
     value.denominator().clone().into()
 }

@@ -36,7 +36,7 @@ impl Trig {
     }
 }
 
-/// What is known of a symbol's sine and cosine beyond s² + c² = 1.
+/// The relations of a symbol's sine and cosine beyond s² + c² = 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SymbolKind {
     /// Nothing.
@@ -91,7 +91,7 @@ impl AngleSymbols {
         }
     }
 
-    /// What is known of a symbol.
+    /// The relations of a symbol.
     pub fn kind(&self, index: usize) -> SymbolKind {
         match &self.angles[index] {
             Angle::PiMultiple(m) if *m == rational::ratio(1, 4) => SymbolKind::Eighth,

@@ -1,5 +1,5 @@
-//! A link's body in other axes: from the arm's parameters to mass, centre and inertia where a description
-//! wants them.
+//! A link's body in other axes: from the arm's parameters to mass, centre and inertia for a robot
+//! description.
 
 use crate::arm::{Arm, Convention, JointKind, Placement};
 use crate::consistency::{parameters_of_body, pseudo_inertia};
@@ -19,7 +19,7 @@ pub(super) struct Body {
 }
 
 impl Body {
-    /// Of a link's ten parameters, in the link's frame.
+    /// The body of a link's ten parameters, in the link's frame.
     pub(super) fn of_parameters(v: &[f64]) -> Body {
         Body {
             mass: v[0],
@@ -29,12 +29,12 @@ impl Body {
         }
     }
 
-    /// Of mass, centre and the tensor about the centre, all in one frame's axes.
+    /// The body of a mass, a centre and the tensor about the centre, all in one frame's axes.
     pub(super) fn about_centre(mass: f64, centre: Vector3<f64>, inertia: &Matrix3<f64>) -> Body {
         Body { mass, moment: centre * mass, tensor: inertia + mass * steiner(&centre) }
     }
 
-    /// As a frame sees it that has this pose in the frame where the body is given.
+    /// The body in a frame that has this pose in the frame in which the body is given.
     pub(super) fn seen_from(&self, frame: &Pose) -> Body {
         let back = frame.rotation.transpose();
         let p = frame.origin;

@@ -1,8 +1,8 @@
-//! Named effects as MuJoCo has them: cogging and LuGre's friction of a `<dcmotor>` (MuJoCo 4, XML reference,
-//! actuator/dcmotor and its technical note), and springs.
+//! Named effects in the form of MuJoCo: cogging and LuGre's friction of a `<dcmotor>` (MuJoCo 4, XML
+//! reference, actuator/dcmotor and its technical note), and springs.
 //!
-//! A `<dcmotor>` without input and without motor constant is passive: nothing of it is left but these two. Its
-//! torque acts on the joint; a term is what the motor has to bring up against it, of the other sign.
+//! A `<dcmotor>` without input and without motor constant is passive: only these two remain. Its torque acts
+//! on the joint; a term is the torque that the motor must supply against it, of the opposite sign.
 
 use super::edit::shortest;
 use super::known::Friction;
@@ -41,7 +41,7 @@ pub(super) struct Spring {
 pub(super) struct Motor {
     /// The motor's attributes in addition to those that make it passive.
     pub(super) attributes: String,
-    /// What it is, and how exactly.
+    /// Description of the effect, and how exact its form is.
     pub(super) words: String,
     /// Whether it has a state, MuJoCo's `act`.
     pub(super) has_state: bool,
@@ -133,7 +133,8 @@ fn spring(terms: &[&Term]) -> Option<Spring> {
     })
 }
 
-/// The sum of some terms' coefficients with its standard error, which takes those of the terms for independent.
+/// The sum of some terms' coefficients with its standard error, under the assumption that those of the terms
+/// are independent.
 fn with_error(terms: &[&Term]) -> String {
     let value = shortest(terms.iter().map(|term| term.coefficient).sum());
     let square: Option<f64> = terms.iter().map(|term| term.std.map(|std| std * std)).sum();

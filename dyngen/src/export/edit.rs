@@ -1,4 +1,4 @@
-//! A text with some places replaced and all other bytes as they were.
+//! A text with some places replaced and all other bytes unchanged.
 
 use roxmltree::Node;
 use std::ops::Range;

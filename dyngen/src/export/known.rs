@@ -1,4 +1,4 @@
-//! What was identified, from the files that say it: every link's parameters, what is known of them, friction.
+//! Identified values from their files: every link's parameters with their errors, and friction.
 
 use super::term::{self, Term};
 use crate::arm::sum::parse_sum;
@@ -13,33 +13,33 @@ const ROUNDING: f64 = 1e-10;
 /// A joint's friction in the two terms that URDF and MJCF have, with standard errors where they are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
-    /// N·m·s/rad or N·s/m; none where it is not to be written.
+    /// Viscous friction, N·m·s/rad or N·s/m; `None` if it is not to be written.
     pub viscous: Option<f64>,
     /// N·m or N: what saturating terms come to.
     pub coulomb: f64,
-    /// Standard errors of both; where a file does not have that of the sum of saturating terms it is the sum of
-    /// theirs, which it is at most.
+    /// Standard errors of both; if a file lacks that of the sum of saturating terms, the sum of their errors
+    /// is taken, which is an upper limit.
     pub std: [Option<f64>; 2],
 }
 
-/// What is to be written into a robot description.
+/// The values to write into a robot description.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known {
     /// Eleven parameters a link in the order of [`Arm::all_parameters`].
     pub values: Vec<f64>,
     /// For each link what is known of its parameters, in words: sums with values and standard errors.
     pub words: Vec<Vec<String>>,
-    /// By joint; none of those that follow others, whose friction is felt at the joint that they follow.
+    /// By joint; `None` for joints that follow others, whose friction acts at the joint that they follow.
     pub friction: Option<Vec<Option<Friction>>>,
     /// Effects beyond friction.
     pub terms: Vec<Term>,
 }
 
 impl Known {
-    /// From a values file and, where there is one, a file with friction and effects, by their texts and names.
+    /// Reads a values file and, if there is one, a file with friction and effects, by their texts and names.
     ///
     /// # Errors
-    /// What the files lack: each link needs all its parameters, and they must be those of a body.
+    /// Missing values of the files: each link needs all its parameters, and they must be possible for a body.
     pub fn read(arm: &Arm, values: (&str, &str), friction: Option<(&str, &str)>) -> Result<Known, String> {
         let (text, file) = values;
         // Text that is no JSON, and keys that stand twice, are reported as for any values file.
@@ -93,8 +93,8 @@ impl Known {
 }
 
 impl Known {
-    /// Without the damping of joints that is not larger than its own standard error, which then stays as it is in the
-    /// robot description; and what is to be reported about that.
+    /// Removes the damping of joints that is not larger than its own standard error, so that the robot
+    /// description keeps its value; returns notes about that.
     pub fn without_uncertain_damping(&mut self, arm: &Arm) -> Vec<String> {
         let mut said = Vec::new();
         let names = arm.joints.iter().enumerate();

@@ -76,7 +76,7 @@ pub fn mjcf(
     Ok(Exported { text: writer.edits.apply(text), notes })
 }
 
-/// What is known of a joint: what it, or its motor's tendon, holds, and the effects in addition to that.
+/// The values of a joint, or of its motor's tendon, and the effects in addition to them.
 fn held(arm: &Arm, known: &Known, i: usize) -> (Held, Motors) {
     let rotor = known.values[11 * i + 10];
     let armature = arm.joints[i].rotor_ratio.as_ref().map(|k| to_f64(k).powi(2) * rotor);

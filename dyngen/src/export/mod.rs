@@ -1,4 +1,4 @@
-//! The way back: what was identified, in a copy of the robot description that the arm was imported from.
+//! Export: identified values in a copy of the robot description that the arm was imported from.
 
 mod body;
 mod dcmotor;

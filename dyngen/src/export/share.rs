@@ -1,4 +1,4 @@
-//! Which link of a robot description gets which body: those that move as one are one link of the arm.
+//! The body of each link of a robot description: links that move together are one link of the arm.
 
 use super::body::{Body, apart, frames};
 use super::known::Known;
@@ -13,7 +13,7 @@ use nalgebra::Matrix3;
 /// How far the arm's axes may be from the file's, m and rad: what taking rounded numbers as meant makes.
 const APART: f64 = 5e-3;
 
-/// What one link of the description gets.
+/// The share of one link of the description.
 pub(super) struct Share {
     pub(super) link: String,
     /// In the link's frame.

@@ -1,4 +1,4 @@
-//! What was named beyond the rigid arm and its friction: the terms of a `model.json`.
+//! The named effects in addition to the rigid arm and its friction: the terms of a `model.json`.
 
 use crate::arm::Arm;
 use serde_json::Value;
@@ -15,7 +15,7 @@ pub struct Term {
     pub coefficient: f64,
     /// Standard error of the coefficient, where it is known.
     pub std: Option<f64>,
-    /// What it is multiplied with.
+    /// The law that the coefficient multiplies.
     pub law: Law,
 }
 

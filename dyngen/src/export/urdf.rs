@@ -16,15 +16,15 @@ use std::fmt::Write;
 pub struct Exported {
     /// The whole file.
     pub text: String,
-    /// What is to be reported about it.
+    /// Notes about the export.
     pub notes: Vec<String>,
 }
 
-/// Writes what is known of an arm into a copy of the URDF that it was imported from; `file` names it in
-/// errors, and `options` say base, tip and locked joints as they did for the import.
+/// Writes identified values of an arm into a copy of the URDF that it was imported from; `file` is its name
+/// in errors, and `options` give base, tip and locked joints as for the import.
 ///
 /// # Errors
-/// Where the file is no URDF of this arm: the joints' names and axes must be those of the arm.
+/// If the file is not a URDF of this arm: the joints' names and axes must be those of the arm.
 pub fn urdf(
     text: &str,
     file: &str,

@@ -4,7 +4,7 @@ use super::{Builder, Expr, Input, JointSum, Node};
 use crate::exact::algebra::Algebra;
 use std::collections::HashMap;
 
-/// What is differentiated by.
+/// The variable of a derivative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// q of a joint: its sine, cosine or position.

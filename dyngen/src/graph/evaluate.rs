@@ -4,7 +4,7 @@ use super::{Expr, Graph, Input, JointSum, Node};
 use crate::exact::prime::Fp;
 use crate::exact::rational::Rational;
 
-/// What the operations of a graph need of a number.
+/// The number type for the operations of a graph.
 pub trait Field: Copy {
     /// a + b
     fn add(self, other: Self) -> Self;

@@ -1,4 +1,4 @@
-//! Hash-consed expressions: what is emitted and evaluated.
+//! Hash-consed expressions, which are emitted and evaluated.
 //!
 //! Every expression exists once. A sign costs nothing: an [`Expr`] is a node and a sign, so x and −x share
 //! their node, and sums and products are stored with the sign pulled out. Constants are exact.
@@ -55,7 +55,7 @@ impl std::ops::Neg for Expr {
     }
 }
 
-/// What a function is given.
+/// An input of a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Input {
     /// sin q of a revolute joint, or sin(q + theta) where theta is no multiple of pi/2; or of a sum of such
@@ -181,7 +181,7 @@ impl Graph {
         (0..self.nodes.len()).filter(|n| needed[*n]).collect()
     }
 
-    /// For each node on what it depends.
+    /// The inputs on which each node depends.
     pub fn holds(&self) -> Vec<Holds> {
         let mut holds: Vec<Holds> = Vec::with_capacity(self.nodes.len());
         for node in &self.nodes {

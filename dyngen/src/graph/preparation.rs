@@ -1,4 +1,4 @@
-//! What functions need of the parameters alone: computed once, not with every state.
+//! The values of functions that depend on the parameters alone: computed once, not with every state.
 
 use super::{Builder, Expr, Graph, Input, Operations, operands};
 
@@ -58,7 +58,7 @@ impl Preparation {
         self.builder.snapshot()
     }
 
-    /// What they cost.
+    /// The operations of the preparation.
     pub fn operations(&self) -> Operations {
         self.graph().operations(&self.values)
     }

@@ -5,7 +5,7 @@ use crate::exact::algebra::Algebra;
 use crate::exact::rational::Rational;
 use crate::exact::symbols::{AngleSymbols, Trig};
 
-/// The arm's angles whose sine and cosine are no rationals: twists and the fixed angles of prismatic joints
+/// The arm's angles whose sine and cosine are not rational: twists and the fixed angles of prismatic joints
 /// ([`joint_symbols`] of them), then those of the tool, the base and the other frames.
 pub fn angle_symbols(arm: &Arm) -> AngleSymbols {
     let frames = arm.frames.iter().map(|frame| &frame.placement);
@@ -73,7 +73,7 @@ pub struct PlacementElements<V> {
 }
 
 impl<V: Clone> PlacementElements<V> {
-    /// Builds the elements of a placement; without one those of the same frame.
+    /// Builds the elements of a placement; without a placement, those of the same frame.
     pub fn build<A: Algebra<Value = V>>(
         algebra: &A,
         placement: Option<&Placement>,
@@ -117,7 +117,7 @@ fn constant<A: Algebra>(
     }
 }
 
-/// Where the elements come from: symbols, numbers, inputs of a graph.
+/// The source of the elements: symbols, numbers, inputs of a graph.
 pub trait Source<V> {
     /// Sine and cosine of q + theta of a revolute joint, which may follow another one.
     fn joint_trig(&mut self, joint: usize) -> (V, V);
@@ -125,17 +125,17 @@ pub trait Source<V> {
     fn position(&mut self, joint: usize) -> V;
     /// q̇.
     fn velocity(&mut self, joint: usize) -> V;
-    /// Link length; asked for only where it is not zero.
+    /// Link length; requested only if it is not zero.
     fn a(&mut self, joint: usize) -> V;
-    /// Offset along y in addition to it; asked for only where it is not zero.
+    /// Offset along y in addition to the link length; requested only if it is not zero.
     fn b(&mut self, joint: usize) -> V;
-    /// Link offset; asked for only where it is not zero.
+    /// Link offset; requested only if it is not zero.
     fn d(&mut self, joint: usize) -> V;
     /// Gear ratio.
     fn ratio(&mut self, joint: usize) -> V;
     /// How fast a motor turns with a joint, an entry of the transmission's matrix; a constant of the arm.
     fn coupling(&mut self, factor: &Rational) -> V;
-    /// Component of gravity; asked for only where it is not zero.
+    /// Component of gravity; requested only if it is not zero.
     fn gravity(&mut self, axis: usize) -> V;
     /// Sine or cosine of an angle symbol.
     fn symbol(&mut self, index: usize, sine: bool) -> V;

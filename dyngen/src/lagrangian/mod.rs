@@ -1,5 +1,5 @@
-//! The Lagrangian of Eq. 5 and 6, linear in the dynamic parameters: the one definition that all else is
-//! derived from or proven against.
+//! The Lagrangian of Eq. 5 and 6, linear in the dynamic parameters: all other results are derived from this
+//! definition or proven against it.
 
 pub mod elements;
 pub mod followers;
@@ -30,7 +30,7 @@ pub fn twice_lagrangian<A: Algebra>(alg: &A, arm: &ArmElements<A::Value>) -> Vec
     twice_lagrangian_on(alg, arm, Motion::base(alg, arm))
 }
 
-/// As [`twice_lagrangian`], where frame 0 moves.
+/// Like [`twice_lagrangian`], for a moving frame 0.
 pub fn twice_lagrangian_on<A: Algebra>(
     alg: &A,
     arm: &ArmElements<A::Value>,
@@ -67,7 +67,7 @@ impl<V: Clone> Motion<V> {
         Motion { omega: zero(), velocity: zero(), gravity: arm.gravity.clone(), height: alg.integer(0) }
     }
 
-    /// Of a frame that is fixed in this one: a shift, then Rz(yaw)·Ry(pitch)·Rx(roll).
+    /// The motion of a frame that is fixed in this one: a shift, then Rz(yaw)·Ry(pitch)·Rx(roll).
     pub fn placed<A: Algebra<Value = V>>(&self, alg: &A, frame: &PlacementElements<V>) -> Self {
         let shift = alg.cross(&self.omega, &frame.origin);
         let velocity = std::array::from_fn(|i| alg.add(&self.velocity[i], &shift[i]));
@@ -83,7 +83,7 @@ impl<V: Clone> Motion<V> {
     }
 }
 
-/// What happens on a joint's axis in the link before it.
+/// The quantities on a joint's axis in the link before it.
 #[derive(Clone, Debug)]
 pub struct Axis<V> {
     /// The link's angular velocity about it.

@@ -1,8 +1,9 @@
 //! Regroups sums and products so that more of them share a part.
 //!
-//! A sum of sums that are used nowhere else is one sum of many terms, and likewise a product. Of a product
-//! the factors that depend on parameters alone are multiplied first: that is prepared once. Then the pair of
-//! terms, or of factors, that occurs in most places becomes a node of its own, as long as one occurs twice.
+//! A sum of sums that are used nowhere else is one sum of many terms, and likewise a product. The factors of
+//! a product that depend on parameters alone are multiplied first: their product is prepared once. Then the
+//! pair of terms, or of factors, that occurs in most places becomes a node of its own, as long as one occurs
+//! twice.
 
 use super::cheaper;
 use super::flat::{Flat, Kind, Leaf};
@@ -32,7 +33,7 @@ fn regroup(graph: &Graph, outputs: &[Expr], kind: Kind) -> (Graph, Vec<Expr>) {
             let (parameters, rest): (Vec<Leaf>, Vec<Leaf>) =
                 std::mem::take(own).into_iter().partition(|(n, _)| !holds[*n].state);
             if parameters.iter().any(|(n, _)| holds[*n].parameters) && parameters.len() > 1 {
-                // Their product is prepared; it stands for them under a number of its own.
+                // Their product is prepared; it replaces them under its own number.
                 let place = nodes.len() + fixed.len();
                 fixed.insert(place, parameters);
                 *own = rest;

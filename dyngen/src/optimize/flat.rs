@@ -1,9 +1,9 @@
-//! Sums and products as flat lists of what they are made of.
+//! Sums and products as flat lists of their parts.
 
 use crate::graph::{Expr, Graph, Node, operands};
 use std::collections::BTreeMap;
 
-/// What is flattened.
+/// The kind of expression that is flattened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Sum,

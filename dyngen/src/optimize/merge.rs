@@ -1,8 +1,8 @@
 //! Merges nodes that are equal as functions, whatever their form.
 //!
 //! Each node's value at two random points modulo the 61-bit prime is its fingerprint. Nodes with the same
-//! fingerprint are the same function but for a chance below 2⁻¹⁰⁰, and what is emitted is proven afterwards
-//! in any case: a false merge would stop the generator, not reach the code.
+//! fingerprint are the same function except with a probability below 2⁻¹⁰⁰, and the emitted code is proven
+//! afterwards in any case: a false merge would stop the generator and not reach the code.
 
 use crate::arm::MAX_JOINTS;
 use crate::exact::constant::ConstantField;

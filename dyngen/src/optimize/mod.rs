@@ -1,4 +1,4 @@
-//! Passes over a graph, in order, each with what holds after it.
+//! Passes over a graph, in order, each with the property that holds after it.
 
 mod associate;
 mod factor;
@@ -8,7 +8,7 @@ mod merge;
 use crate::exact::constant::ConstantField;
 use crate::graph::{Expr, Graph};
 
-/// A pass by name: what it turns a graph and its outputs into.
+/// A pass: it transforms a graph and its outputs.
 pub type Pass = fn(&Graph, &[Expr], &ConstantField) -> (Graph, Vec<Expr>);
 
 /// The passes in order.

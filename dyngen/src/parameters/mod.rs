@@ -1,5 +1,5 @@
-//! Parameter sets as values: what a set's parameters stand for and how they enter the dynamics. Which sets
-//! an arm has is found out later, from its Lagrangian.
+//! Parameter sets as values: the sums of a set's parameters, and how they enter the dynamics. The sets of an
+//! arm are found later, from its Lagrangian.
 
 pub mod span;
 
@@ -54,9 +54,9 @@ pub type Combination = Vec<(Parameter, Constant)>;
 /// One parameter of a set.
 #[derive(Clone, Debug)]
 pub struct SetParameter {
-    /// The sum it stands for as text, or the name in the publication.
+    /// The sum of the parameter as text, or the name in the publication.
     pub name: String,
-    /// The sum it stands for.
+    /// The sum of the parameter.
     pub terms: Combination,
     /// How it enters the dynamics: the inertial parameters that carry its value when all others are zero.
     pub carriers: Combination,
@@ -75,7 +75,7 @@ pub struct ParameterSet {
     pub relations: Vec<String>,
     /// Whether the torque stays the same when all parameters are replaced by the set's sums.
     pub exact: bool,
-    /// Where it is not exact: the parameters that the sums lose, and why.
+    /// If the set is not exact: the parameters that the sums lose, and the reason.
     pub lost: Vec<(Parameter, String)>,
 }
 

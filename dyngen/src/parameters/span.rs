@@ -1,5 +1,5 @@
-//! Sums of parameters as combinations of other sums: what one base set determines of another one of the same
-//! arm.
+//! Sums of parameters as combinations of other sums: the parameters of one base set from those of another one
+//! of the same arm.
 
 use crate::arm::Parameter;
 
@@ -10,8 +10,8 @@ pub type Sum = Vec<(Parameter, f64)>;
 const SAME: f64 = 1e-9;
 
 /// Each of the `wanted` sums as a combination of the `given` ones, coefficient by coefficient in their order;
-/// `None` where one of them is none. Every given sum must have a parameter that no other one has, as those of
-/// a base set have: the column it was chosen for.
+/// `None` if one of them is not such a combination. Every given sum must have a parameter that no other one
+/// has, as those of a base set have: the column it was chosen for.
 #[must_use]
 pub fn combinations(wanted: &[Sum], given: &[Sum]) -> Option<Vec<Vec<f64>>> {
     let own: Vec<(Parameter, f64)> = given

@@ -97,7 +97,7 @@ pub fn has_full_rank(arm: &Arm, symbols: &AngleSymbols, sets: &Sets) -> bool {
     arm.dof() >= 6 && inverse(square, 6).iter().any(|x| *x != Fp::ZERO)
 }
 
-/// What the Lagrangian says the function's result must be, row-major.
+/// The function's result by the Lagrangian, row-major.
 pub(crate) fn expected(point: &Point<'_>, set: &ParameterSet, function: Function) -> Vec<Fp> {
     let n = point.dof();
     let zeros = vec![Fp::ZERO; n];

@@ -95,7 +95,7 @@ impl<'a> Point<'a> {
         }
     }
 
-    /// This point's values at the pose where every coordinate's input angle is zero.
+    /// The values of this point at the pose where every coordinate's input angle is zero.
     pub(crate) fn at_zero(&self) -> Point<'a> {
         Point {
             angles: angles(self.arm, &mut || (Fp::ZERO, Fp::ONE)),
@@ -182,7 +182,7 @@ impl<'a> Point<'a> {
         matrix
     }
 
-    /// What a function is given for an argument.
+    /// The values of a function's argument.
     pub(crate) fn argument(&self, set: &ParameterSet, argument: Argument) -> Vec<Fp> {
         match argument {
             Argument::Positions => self.positions.clone(),

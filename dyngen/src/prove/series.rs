@@ -1,4 +1,5 @@
-//! The pose with its first and mixed second derivatives, modulo the prime: what kinematics is proven against.
+//! The pose with its first and mixed second derivatives, modulo the prime, against which kinematics is
+//! proven.
 
 use super::point::Point;
 use super::varied::{MIXED, Mixed, Varied, mixed};

@@ -133,7 +133,7 @@ impl<'p, 'a> State<'p, 'a> {
 struct JetSource<'p, 'a, A: OverPrime> {
     jets: Jets<A>,
     kinematics: Varied<'p, 'a, A>,
-    /// Of the coordinates.
+    /// Velocities of the coordinates.
     velocities: Vec<A::Value>,
     accelerations: Vec<A::Value>,
     gravity: bool,

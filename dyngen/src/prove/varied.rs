@@ -40,7 +40,7 @@ pub(super) fn mixed(x: Fp, u: Fp, v: Fp) -> Mixed {
 pub(super) struct Varied<'p, 'a, A: Algebra> {
     pub(super) algebra: A,
     pub(super) point: &'p Point<'a>,
-    /// What is added to each coordinate's q.
+    /// The change of each coordinate's q.
     pub(super) change: Vec<A::Value>,
 }
 

@@ -1,4 +1,4 @@
-//! Keys that stand twice in one object of a JSON text: readers take one of the two values and say nothing.
+//! Keys that occur twice in one object of a JSON text: readers silently take one of the two values.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! What stands on top of `powerball`: the paper's procedure on a bus, pages of results, the command.
+//! The top layer of `powerball`: the paper's procedure on a bus, pages of results, the command.
 
 #[cfg(feature = "demo")]
 pub mod commands;

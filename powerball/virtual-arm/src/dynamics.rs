@@ -1,14 +1,14 @@
-//! Recursive Newton–Euler in numbers, and what follows from it by superposition.
+//! Recursive Newton–Euler in numbers, and the quantities that follow from it by superposition.
 //!
 //! This is the virtual arm's own physics. It shares no code with the generator, so that each can test the
 //! other. Everything is in SI units; forces and moments of link i are expressed in frame i, about its origin.
 //!
-//! Also here: the mass of a link and its rotor, as the eleven parameters of Eq.
+//! The module also has the mass of a link and its rotor, as the eleven parameters of Eq.
 
 use nalgebra::{Matrix3, Vector3};
 use powerball_logs::chain::Chain;
 
-/// The largest number of joints that the recursion has room for.
+/// The largest number of joints that the recursion can hold.
 const ROOM: usize = dyngen::arm::MAX_JOINTS;
 
 /// A chain with the bodies that it carries: the rigid-body dynamics of Eq. 14 without friction.
@@ -61,8 +61,8 @@ impl Dynamics {
         self.run(&self.bodies, Pass { q, dq, ddq, gravity, outside: [Vector3::zeros(); 2] })
     }
 
-    /// As [`inverse`](Self::inverse), with a force (N) at the last frame's origin and a moment (N·m) that
-    /// come from outside, both in the base frame.
+    /// Like [`inverse`](Self::inverse), with an external force (N) at the last frame's origin and an external
+    /// moment (N·m), both in the base frame.
     pub fn inverse_in_contact(
         &self,
         q: &[f64],

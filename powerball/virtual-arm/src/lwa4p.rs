@@ -42,7 +42,7 @@ pub fn links() -> Vec<Body> {
     LINKS.iter().map(|(mass, centre, edges, rotor)| Body::even_box(*mass, *centre, *edges, *rotor)).collect()
 }
 
-/// Where effects that are drawn sit on this arm.
+/// The places of random effects on this arm.
 #[must_use]
 pub fn places() -> Places {
     Places {

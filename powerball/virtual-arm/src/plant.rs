@@ -1,6 +1,6 @@
 //! The plant: an arm that follows a motion, and the log that its drives would give.
 //!
-//! Also here: the virtual arm with what no model knows about it, as a file.
+//! The module also has the file of a virtual arm, with the effect that no model knows.
 
 use super::dynamics::Dynamics;
 use super::effect::{Instant, PlantEffect, State};
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// What the drives measure, and how well.
+/// The sensors of the drives, and their noise.
 #[derive(Clone, Debug)]
 pub struct Sensors {
     /// Samples a second.
@@ -169,7 +169,7 @@ impl SimulatedLog {
         self.dof
     }
 
-    /// As a log that was read.
+    /// The recording as a log.
     pub fn log(&self, file: impl Into<String>) -> Log {
         let n = self.dof;
         let by_joint = |values: &[f64]| -> Vec<Vec<f64>> {
@@ -188,7 +188,7 @@ impl SimulatedLog {
         }
     }
 
-    /// As CSV with a header line: `t`, `q1…qn`, `tau1…taun`.
+    /// The recording as CSV with a header line: `t`, `q1…qn`, `tau1…taun`.
     pub fn to_csv(&self) -> String {
         let mut out = String::from("t");
         for name in ["q", "tau"] {
@@ -228,7 +228,7 @@ impl SimulatedLog {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Undeclared {
-    /// What is in the plant and in no model.
+    /// The effect that is in the plant and in no model.
     pub effect: PlantEffect,
     /// Age of the plant, s: what warms has been warming for this time.
     pub age: f64,
@@ -264,7 +264,7 @@ impl Undeclared {
         VirtualArm::new(setup).ok_or_else(|| Diagnostics::whole_file("lwa4p.toml", "six joints are needed"))
     }
 
-    /// What it is made of.
+    /// The plant and its drives.
     ///
     /// # Errors
     /// None for the arm file that is built in.

@@ -1,13 +1,13 @@
-//! The plant in time: what the arm does under the torques of its drives.
+//! The plant in time: the motion of the arm under the torques of its drives.
 //!
 //! Each step is linearly implicit in what is stiff. Friction is first a torque s·q̇' against the new velocity
 //! q̇' with the secant s = f(q̇)/q̇ of the old one: Eq. 16's tanh(216 q̇) then dissipates at any step and
-//! comes to rest without chatter. With the velocity so found, the chord of f from the old velocity to the new one
-//! takes the secant's place: where friction has saturated, it no longer follows the velocity. A gear that gives
-//! way is a spring and a damper between two masses, taken at the end of the step. Everything else is taken at
-//! its start.
+//! comes to rest without chatter. With the velocity so found, the chord of f from the old velocity to the new
+//! one takes the secant's place: where friction has saturated, it no longer follows the velocity. An elastic
+//! gear is a spring and a damper between two masses, taken at the end of the step. Everything else is taken
+//! at its start.
 //!
-//! Also here: a drive's servo.
+//! The module also has a drive's servo.
 
 use super::dynamics::{Dynamics, solve_positive_definite};
 use super::effect::{Gear, Instant, State};
@@ -34,7 +34,7 @@ struct Motor {
     velocity: f64,
 }
 
-/// A plant that moves. Effects, friction and bodies are those of the [`Plant`]; sensors are not asked here.
+/// A plant that moves. Effects, friction and bodies are those of the [`Plant`]; sensors are not used here.
 #[derive(Clone, Debug)]
 pub struct Simulation {
     plant: Plant,
@@ -132,8 +132,8 @@ impl Simulation {
         self.brakes[joint] = closed;
     }
 
-    /// What each drive has to move at once, kg·m²: the diagonal of the mass matrix at the present pose,
-    /// rotors included, or the motor alone where its gear gives way.
+    /// The inertia that each drive moves directly, kg·m²: the diagonal of the mass matrix at the present
+    /// pose, rotors included, or the motor alone if its gear is elastic.
     pub fn inertias(&self) -> Vec<f64> {
         let n = self.dof();
         let matrix = self.plant.dynamics().mass_matrix(&self.q);
@@ -344,7 +344,7 @@ impl Gains {
 pub struct Servo {
     /// The gains.
     pub gains: Gains,
-    /// What the velocity loop's integrator holds, N·m.
+    /// Torque of the velocity loop's integrator, N·m.
     held: f64,
 }
 

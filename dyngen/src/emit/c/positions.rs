@@ -1,4 +1,4 @@
-//! What functions in C take of joint positions: their sines and cosines.
+//! The sines and cosines of joint positions for functions in C.
 
 use super::{Item, Names, SYNTAX, documentation};
 use crate::emit::angles::{all_inputs, shifted_docs, sum_docs, turns};

@@ -34,10 +34,10 @@ pub fn read(arm: &Arm, file: &Path, effects: bool) -> Result<ModelArm, String> {
     ModelOnArm::new(arm, &ModelFile::read(file).map_err(|e| e.to_string())?, effects)
 }
 
-/// What the model predicts for a path on an arm that has been working for `running` s.
+/// The torques that the model predicts for a path on an arm that has been working for `running` s.
 ///
 /// # Errors
-/// Where the path takes more torque than a joint has, in words.
+/// If the path needs more torque than a joint has.
 pub fn parts(on: &ModelArm, path: &DrivenPath<6>, running: f64) -> Result<Parts<6>, String> {
     let planned = on.model.planned(&on.body, path.motion(), running);
     let vectors = |x: &[f64]| x.chunks_exact(6).map(SVector::from_column_slice).collect::<Vec<_>>();
@@ -58,10 +58,10 @@ pub fn parts(on: &ModelArm, path: &DrivenPath<6>, running: f64) -> Result<Parts<
     }
 }
 
-/// What says that something touches the arm, of what a model leaves where it holds.
+/// The detector of contact, from the residual of the model while it holds.
 ///
 /// # Errors
-/// A model whose file does not say that.
+/// A model whose file does not have this residual.
 pub fn contact_detector(on: &ModelArm) -> Result<ContactDetector<f64, 6>, String> {
     let colour = on.model.colour.as_ref().ok_or(
         "the model file has no spectrum of its residual (`colour`): take model.json of `powerball explain`",

@@ -36,10 +36,10 @@ pub struct Plan {
     pub plateaus: Vec<Plateau>,
 }
 
-/// What bounds the motion.
+/// The limits of the motion.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
-    /// Where the joint may be, rad.
+    /// Range of the joint's position, rad.
     pub position: [f64; 2],
     /// rad/s²
     pub acceleration: f64,

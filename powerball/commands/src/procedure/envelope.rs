@@ -1,5 +1,5 @@
-//! What a motion must keep, looked at as a whole before the arm moves: the driver's own guard sample by sample, the
-//! torque that the joints have, the floor, and the arm's links among each other.
+//! The limits of a motion, checked as a whole before the arm moves: the driver's own guard sample by sample,
+//! the torque that the joints have, the floor, and the arm's links among each other.
 
 use super::RecordError;
 use dyngen::{Arm, Model};
@@ -14,20 +14,20 @@ use std::fmt;
 /// Says why the arm must not go along a motion.
 type Barred = Box<dyn Fn(&Motion) -> Option<String>>;
 
-/// A motion that was looked at as a whole and let through. It takes a millisecond a thousand samples to look, so it is
-/// done before the arm has torque: a cycle has no such time.
+/// A motion that was checked as a whole and passed. The check takes a millisecond per thousand samples, so it
+/// is done before the arm has torque: a cycle does not have this time.
 #[derive(Clone, Debug)]
 pub struct Cleared(Motion);
 
 impl Cleared {
-    /// What was let through.
+    /// The motion that passed.
     #[must_use]
     pub fn motion(&self) -> &Motion {
         &self.0
     }
 }
 
-/// What the motions of an arm of `N` joints must keep.
+/// The limits of the motions of an arm of `N` joints.
 pub struct Envelope<const N: usize> {
     /// Why the arm must not go along a motion, in addition to the limits of its joints.
     barred: Barred,
@@ -41,8 +41,8 @@ impl<const N: usize> fmt::Debug for Envelope<N> {
 }
 
 impl<const N: usize> Envelope<N> {
-    /// What `barred` returns for a motion, and no check of torques: for arms whose surroundings are known
-    /// otherwise.
+    /// An envelope with the check `barred` of a motion and without a check of torques, for arms whose
+    /// surroundings are known otherwise.
     pub fn new(barred: impl Fn(&Motion) -> Option<String> + 'static) -> Envelope<N> {
         Envelope { barred: Box::new(barred), torque: None }
     }
@@ -152,9 +152,9 @@ fn as_sent(motion: &Motion) -> Motion {
     sent
 }
 
-/// What set-points and motions of the built-in arm are checked with where nothing better is known: the bodies of the CAD
-/// model, and Table 2's friction. What a cold arm's friction is beyond that, and what is mounted on it, must fit into a fifth
-/// of its torque.
+/// The masses for the check of set-points and motions of the built-in arm if no better ones are known: the
+/// bodies of the CAD model, and Table 2's friction. The additional friction of a cold arm, and its payload,
+/// must fit into a fifth of its torque.
 #[cfg(feature = "demo")]
 #[must_use]
 pub fn built_in_masses() -> Masses {

@@ -13,16 +13,16 @@ use serde_json::{Value, json};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// What is planned for a joint.
+/// The planned experiment of a joint.
 #[derive(Clone, Debug)]
 pub struct Experiment {
-    /// Where gravity is off the joint.
+    /// The pose in which gravity does not load the joint.
     pub place: GravityFree,
     /// The motion.
     pub plan: Plan,
 }
 
-/// What a joint's log says.
+/// The result from a joint's log.
 #[derive(Clone, Debug)]
 pub struct JointFriction {
     /// Joint, from 0.
@@ -140,7 +140,7 @@ pub fn analyse(model: &Model, experiment: &Experiment, path: &Path) -> Result<Jo
 }
 
 impl JointFriction {
-    /// As a JSON object.
+    /// The result as a JSON object.
     #[must_use]
     pub fn json(&self) -> Value {
         let law = |rated: &Rated| {

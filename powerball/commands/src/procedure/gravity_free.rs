@@ -1,5 +1,5 @@
-//! Poses in which gravity puts no torque on a joint, for any place of that joint: where friction can be seen
-//! alone.
+//! Poses in which gravity puts no torque on a joint, at any position of that joint, so that friction can be
+//! measured alone.
 
 use dyngen::arm::JointKind;
 use dyngen::{Evaluator, Function, Model, SetKind};
@@ -19,8 +19,8 @@ pub struct GravityFree {
     pub mounting: Mounting,
     /// The joints, rad; the joint itself may be anywhere.
     pub pose: Vec<f64>,
-    /// What is left: the sine of the angle between the joint axis and gravity (its cosine where the joint is
-    /// prismatic).
+    /// Remaining share of gravity: the sine of the angle between the joint axis and gravity (its cosine where
+    /// the joint is prismatic).
     pub leftover: f64,
 }
 

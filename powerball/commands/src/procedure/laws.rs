@@ -182,7 +182,7 @@ impl Fitted {
     }
 }
 
-/// A law fitted to all points, with what it is worth on points that it has not seen.
+/// A law fitted to all points, with its error on points that were not fitted.
 #[derive(Clone, Debug)]
 pub struct Rated {
     /// The fit.

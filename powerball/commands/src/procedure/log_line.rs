@@ -1,6 +1,6 @@
-//! What a line of a recording states about its cycle.
+//! The line of a recording about one cycle.
 //!
-//! Also here: what a person reads while the arm moves; lines written by a thread of their own.
+//! The module also has the progress that is shown while the arm moves, and a writer with its own thread.
 
 use powerball_bus::canopen::Micros;
 use powerball_bus::driver::{Counters, Driver};
@@ -98,7 +98,7 @@ impl Columns {
 #[derive(Debug)]
 pub struct MotionLog {
     time: LogTime,
-    /// Where counts begin, once the header is written.
+    /// The counters at the beginning, once the header is written.
     begin: Option<Counters>,
     line: String,
     out: Option<Behind<LogFile>>,
@@ -157,14 +157,14 @@ impl Drop for MotionLog {
     }
 }
 
-// What is shown to a person while the arm moves.
+// The progress that is shown while the arm moves.
 
 /// How far a motion has come.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordProgress {
     /// Samples that were given, and all there are.
     pub samples: [usize; 2],
-    /// Where the joints are, rad.
+    /// Positions of the joints, rad.
     pub position: Vec<f64>,
     /// The greatest distance of a joint from its set-point now, rad.
     pub error: f64,
@@ -193,8 +193,9 @@ impl fmt::Display for RecordProgress {
 /// is held up stops the arm.
 const WAITING: usize = 4000;
 
-/// What is written here is written by another thread, whole and in order, each call by one call there. An error there
-/// is the error of a later call here. Dropping it waits until everything is written, as [`close`](Behind::close) does.
+/// A writer whose data another thread writes, completely and in order, with one call for each call here. An
+/// error there is the error of a later call here. Dropping it waits until everything is written, as
+/// [`close`](Behind::close) does.
 #[derive(Debug)]
 pub struct Behind<W: Write + Send + 'static> {
     lines: Option<SyncSender<Vec<u8>>>,

@@ -1,4 +1,4 @@
-//! The paper's procedure (§II.C, §III): what is done with an arm, and what its records say.
+//! The paper's procedure (§II.C, §III): the motions of an arm, and the results from their records.
 
 pub mod constant_velocity;
 pub mod envelope;

@@ -1,9 +1,9 @@
 //! A motion in interpolated position mode, and the log of it.
 //!
-//! Every line of a log is written whole, by one call, when its cycle is over: whatever moment the program
-//! dies at, the file can be read up to there.
+//! Every line of a log is written whole, by one call, when its cycle is over: if the program dies at any
+//! moment, the file can be read up to there.
 //!
-//! Also here: why an arm is not recorded.
+//! [`RecordError`] says why an arm is not recorded.
 
 use super::{Cleared, Columns, Envelope, LogTime, RecordProgress, approach};
 use powerball_bus::driver::{ControlMode, Phase, Profile, Rejection};
@@ -19,7 +19,7 @@ const APPROACH: f64 = 0.25;
 /// Time that bringing up and enabling may take, µs: joints commutate one after the other.
 const PATIENCE: u64 = 60_000_000;
 
-/// What came of a recording.
+/// The result of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Record {
     /// Lines of the log.
@@ -42,7 +42,7 @@ pub struct Record {
 /// An arm that is enabled in interpolated position mode and holds its position between motions.
 pub struct Recorder<B: Bus, const N: usize> {
     master: Master<B, N>,
-    /// What every motion must keep.
+    /// The limits of every motion.
     envelope: Envelope<N>,
     /// The set-point that is held.
     target: [f64; N],
@@ -138,7 +138,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
             }
             match moment {
                 Moment::Cycle => {
-                    // The cycle before is over; what it did not bring is missing.
+                    // The cycle before is over; data that did not arrive in it is missing.
                     if let Some(missed) = waiting.take() {
                         each(missed, None)?;
                     }
@@ -188,11 +188,11 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         }
     }
 
-    /// The way to a position, each joint straight there: at a share of its velocity and acceleration, in `least` s at
-    /// least. It was looked at as a whole.
+    /// The path to a position, each joint straight there: at a share of its velocity and acceleration, in at
+    /// least `least` s. It was checked as a whole.
     ///
     /// # Errors
-    /// [`RecordError::Barred`] where the arm must not go it.
+    /// [`RecordError::Barred`] if the arm must not take it.
     pub fn way_to(&self, to: &[f64; N], share: f64, least: f64) -> Result<Cleared, RecordError> {
         let profile = self.master.driver().profile();
         let motion = way(profile, &self.target, to, share, least);
@@ -292,7 +292,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         self.finish_with_envelope().map(|(master, _)| master)
     }
 
-    /// As [`Self::finish`]; gives back what motions must keep as well.
+    /// Like [`Self::finish`]; also returns the limits of the motions.
     pub(super) fn finish_with_envelope(mut self) -> Result<(Master<B, N>, Envelope<N>), RecordError> {
         self.master.stop()?;
         Ok((self.master, self.envelope))

@@ -1,4 +1,4 @@
-//! What a step of the procedure left on disk, so that one that was broken off goes on where it was.
+//! The files that a step of the procedure left on disk, so that an interrupted step continues.
 
 use std::fs::OpenOptions;
 use std::io;
@@ -33,10 +33,10 @@ pub fn silence(path: &Path) -> Option<f64> {
     Some(written.elapsed().map_or(0.0, |time| time.as_secs_f64()))
 }
 
-/// Opens a log to go on with it: a torn last line is cut off.
+/// Opens a log to continue it: an incomplete last line is removed.
 ///
 /// # Errors
-/// What the file system says.
+/// Errors of the file system.
 pub fn append(path: &Path) -> io::Result<std::fs::File> {
     let text = std::fs::read(path)?;
     let whole = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);

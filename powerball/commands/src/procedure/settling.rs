@@ -1,6 +1,6 @@
 //! Whether an arm is warm: the mean torque of each cycle, its exponential (Fig. 3), and a test of its trend.
 //!
-//! Also here: the way to where a motion begins.
+//! The module also moves the arm to the beginning of a motion.
 
 use powerball_identification::estimate::distribution::t_quantile_975;
 use powerball_logs::motion::Motion;

@@ -1,9 +1,11 @@
-//! The arm under torques of the caller: a law in, a current a joint and cycle out, behind the driver's guards.
+//! The arm under torques of the caller: from a law to a current per joint and cycle, behind the driver's
+//! guards.
 //!
-//! The measurement of a SYNC is there when all process data of its cycle is; the torque that is computed from it leaves
-//! in the same cycle's slot, acts from the next SYNC on and holds for a cycle. Where data of a joint does not come in time,
-//! its state is carried on with its last velocity, for as many cycles as the driver tolerates
-//! ([`TorqueMode::missing_cycles`](powerball_bus::driver::profile::TorqueMode)); then the arm is stopped.
+//! The measurement of a SYNC is there when all process data of its cycle is; the torque that is computed from
+//! it leaves in the same cycle's slot, acts from the next SYNC on and holds for a cycle. Where data of a
+//! joint does not come in time, its state is extrapolated with its last velocity, for as many cycles as the
+//! driver tolerates ([`TorqueMode::missing_cycles`](powerball_bus::driver::profile::TorqueMode)); then the
+//! arm is stopped.
 
 use super::{MotionLog, RecordError};
 use nalgebra::SVector;
@@ -21,12 +23,12 @@ const WITHIN: f64 = 0.999;
 /// This long before the set-points leave, a law is evaluated with what has come, µs.
 const LEAD: u64 = 300;
 
-/// What a law asks for.
+/// The output of a law.
 #[derive(Clone, Copy, Debug)]
 pub struct Asked<const N: usize> {
     /// N·m by joint.
     pub torque: SVector<f64, N>,
-    /// Where the joints should be at the SYNC of the measurement, and how far they may be from there.
+    /// Desired positions of the joints at the SYNC of the measurement, and their tolerance.
     pub tracking: Option<Tracking<N>>,
 }
 
@@ -36,7 +38,7 @@ impl<const N: usize> From<SVector<f64, N>> for Asked<N> {
     }
 }
 
-/// What a cycle brought.
+/// The measurements of a cycle.
 #[derive(Clone, Copy, Debug)]
 pub struct Measured<const N: usize> {
     /// SYNCs since the loop began.

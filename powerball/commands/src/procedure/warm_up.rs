@@ -27,7 +27,7 @@ impl Default for Settings {
     }
 }
 
-/// What was seen of a joint.
+/// The result for one joint.
 #[derive(Clone, Debug)]
 pub struct JointWarmth {
     /// The joint's cycles.
@@ -38,7 +38,7 @@ pub struct JointWarmth {
     pub trend: Option<Trend>,
 }
 
-/// What came of a warm-up.
+/// The result of a warm-up.
 #[derive(Clone, Debug)]
 pub struct Warmth {
     /// By joint.
@@ -215,7 +215,7 @@ pub fn warm_up<B: Bus, const N: usize>(
 }
 
 impl Warmth {
-    /// As a JSON object.
+    /// The result as a JSON object.
     #[must_use]
     pub fn json(&self) -> Value {
         let joint = |(j, joint): (usize, &JointWarmth)| {

@@ -1,4 +1,4 @@
-//! An excitation as JSON and as a page: what the arm will do, and how it keeps its limits.
+//! An excitation as JSON and as a page: the motion of the arm, and how it keeps its limits.
 
 use crate::report::{Figure, Ink, JOINTS, Page, Panel, Series, Table, number};
 use powerball_identification::excite::{Excited, Figures, Fourier, Trajectory};

@@ -1,6 +1,6 @@
 //! Line and scatter figures: one or several panels over a common horizontal axis.
 //!
-//! Also here: fewer points for the same picture.
+//! The module also reduces the number of points without a visible change.
 
 use super::axis::Axis;
 use super::escape;

@@ -1,4 +1,4 @@
-//! A path that was followed, as JSON and as a page: how far off with which model, and what the torque was for.
+//! A path that was followed, as JSON and as a page: the error with each model, and the parts of the torque.
 
 use crate::procedure::follow::{Followed, Path, Track};
 use crate::report::{Figure, Files, Ink, Page, Panel, Table, Tone, number};

@@ -1,4 +1,4 @@
-//! The files of a look into logs: what is in them, what it is taken to be, and how it runs.
+//! The files of an inspection of logs: their content, its interpretation, and the signals over time.
 
 use crate::report::{Figure, Files, JOINTS, Page, Panel, Series, Table, Tone, number};
 use powerball_logs::log::{Inspected, InspectedTable, Log};

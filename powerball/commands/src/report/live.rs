@@ -15,8 +15,8 @@ pub(super) const LICENCE: &str = include_str!("uplot/LICENSE");
 pub(super) const SCRIPTS: [&str; 2] = [include_str!("uplot/uPlot.iife.min.js"), include_str!("figures.js")];
 pub(super) const STYLE: &str = include_str!("uplot/uPlot.min.css");
 
-/// The page of a motion that goes on: it takes server-sent events from `events` next to it, with its own query; `stream.js` says
-/// which.
+/// The page of a running motion: it takes server-sent events from `events` next to it, with its own query;
+/// `stream.js` defines them.
 #[must_use]
 pub fn stream_page() -> String {
     format!(
@@ -41,7 +41,7 @@ pub(super) fn samples(figure: &Figure) -> String {
     let Figure { title, x_label, panels } = figure;
     let panels: Vec<Value> = panels.iter().map(panel).collect();
     let text = json!({ "title": title, "x": x_label, "panels": panels }).to_string();
-    // Nothing of a text may end the element.
+    // No part of a text may end the element.
     format!("<script type=\"application/json\">{}</script>", text.replace('<', "\\u003c"))
 }
 
@@ -69,7 +69,7 @@ fn of_series(series: &Series) -> Value {
         }
         _ => envelope(points, STRETCHES),
     };
-    // A break has the time of what is before it, where it has none of its own.
+    // A break without a time of its own has the time of the sample before it.
     let mut last = f64::NAN;
     let times = points.iter().map(|p| {
         last = if p.0.is_finite() { p.0 } else { last };

@@ -47,7 +47,7 @@ pub use powerball_explanation::effects::words::number;
 /// The style of pages and figures.
 const STYLE: &str = include_str!("page.css");
 
-/// What in the head of a page says that it was made here.
+/// The mark in the head of a page that was made here.
 pub const MADE_BY: &str = "<meta name=\"generator\" content=\"powerball\">";
 
 /// The band of an error that ends there, Hz, in words.

@@ -1,6 +1,6 @@
 //! The page: a sequence of headings, paragraphs, notes, tables and figures.
 //!
-//! Also here: tables.
+//! The module also has tables.
 
 use super::{BarPairs, Figure, MADE_BY, escape, live};
 use std::fmt::Write as _;
@@ -10,8 +10,8 @@ use std::sync::OnceLock;
 /// What stands at the foot of every page.
 static SIGNATURE: OnceLock<String> = OnceLock::new();
 
-/// Puts a line below every page that this process makes from now on: what made it, how and when. A program says it once;
-/// without it pages say nothing of themselves.
+/// Puts a line below every page that this process makes from now on: the program that made it, how and when.
+/// A program sets it once; without it, pages have no such line.
 pub fn sign(text: impl Into<String>) {
     let _ = SIGNATURE.set(text.into());
 }
@@ -87,7 +87,7 @@ impl Page {
         self.body.push_str(&table.to_html());
     }
 
-    /// What the words of a page mean, behind a line of text that opens it; printed pages show it.
+    /// Explanations of the words of a page, behind a line of text that opens them; printed pages show them.
     pub fn words(&mut self, words: &[(&str, &str)]) {
         self.body
             .push_str("<details class=\"words\"><summary>What the words of this page mean</summary><dl>");

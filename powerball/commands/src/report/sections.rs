@@ -1,10 +1,11 @@
-//! Sections that several pages have: what the columns of logs are, and the transmissions between two torques.
+//! Sections that several pages have: the meaning of the columns of logs, and the transmissions between two
+//! torques.
 
 use crate::report::{Page, Table, Tone, number};
 use powerball_identification::conventions::Conventions;
 use powerball_identification::transmission::{JointTransmission, Transmission, TransmissionEffect};
 
-/// What is wrong with the columns or the arm file, or that nothing is.
+/// Writes the errors of the columns or the arm file, or that there are none.
 pub fn columns_verdict(page: &mut Page, conventions: &Conventions) {
     let tone = if conventions.differ() { Tone::Bad } else { Tone::Plain };
     page.note(tone, &conventions.verdict());

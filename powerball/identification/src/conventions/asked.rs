@@ -84,7 +84,7 @@ impl<'a> Asked<'a> {
     /// The rows of a reading of the positions.
     ///
     /// # Errors
-    /// Where too little remains.
+    /// If too little remains.
     pub(super) fn rows(&self, read: &Positions, gravity: Gravity) -> Result<Rows<'a>, DataError> {
         self.whole.rows(self.body, read, gravity)
     }
@@ -92,7 +92,7 @@ impl<'a> Asked<'a> {
     /// Few rows, for comparing readings of the positions.
     ///
     /// # Errors
-    /// Where too little remains.
+    /// If too little remains.
     pub(super) fn few(&self, read: &Positions, gravity: Gravity) -> Result<Rows<'a>, DataError> {
         self.few.rows(self.body, read, gravity)
     }
@@ -100,7 +100,7 @@ impl<'a> Asked<'a> {
     /// Rows over as many seconds as [`Asked::rows`] at a lower rate, for comparing arms.
     ///
     /// # Errors
-    /// Where too little remains.
+    /// If too little remains.
     pub(super) fn slow(&self, read: &Positions, gravity: Gravity) -> Result<Rows<'a>, DataError> {
         self.slow.rows(self.body, read, gravity)
     }

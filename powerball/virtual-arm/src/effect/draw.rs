@@ -1,4 +1,4 @@
-//! Effects drawn by lot, of sizes that matter and that happen.
+//! Random effects, of sizes that matter and that occur on real arms.
 
 use super::PlantEffect;
 use crate::plant::Plant;
@@ -8,7 +8,7 @@ use rand::{Rng, RngExt};
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Where effects sit on an arm; joints and links from 0.
+/// The places of effects on an arm; joints and links from 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Places {
     /// Joints that have what any joint may have.
@@ -217,11 +217,12 @@ impl PlantEffect {
         &Self::NAMES[..18]
     }
 
-    /// Draws an effect of that name: its joint and its figures. `session` is the time in s within which the logs
-    /// are recorded, and what starts at some time starts within `begins`.
+    /// Draws an effect of that name: its joint and its figures. `session` is the time in s within which the
+    /// logs are recorded, and an effect that starts at some time starts within `begins`.
     ///
     /// Sizes are chosen against the joint's friction and noise, such that the effect can be seen in a log but
-    /// does not outgrow what it disturbs. `None` for a name that is not known, or has no place on the arm.
+    /// is not larger than the torque that it disturbs. `None` for a name that is not known, or has no place
+    /// on the arm.
     pub fn draw(
         name: &str,
         plant: &Plant,
@@ -255,7 +256,7 @@ impl PlantEffect {
         }
     }
 
-    /// This effect about `factor` times as large, where and when it is.
+    /// This effect about `factor` times as large, at the same place and time.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> PlantEffect {
         let mut scaled = self.clone();

@@ -1,8 +1,8 @@
-//! What a real arm does and its model may not know, as physical laws of the plant.
+//! Effects of a real arm that its model may lack, as physical laws of the plant.
 //!
-//! These laws are written for the plant alone. Where an estimator has a term for the same phenomenon, its
-//! formula is another one: the gear's load friction is smooth here, presliding is a set of elastic sliders,
-//! and so on. A name is then found for its physics and not for its formula.
+//! These laws are written for the plant alone. If an estimator has a term for the same phenomenon, its
+//! formula is different: the gear's load friction is smooth here, presliding is a set of elastic sliders, and
+//! so on. A name is then found for its physics and not for its formula.
 
 mod draw;
 
@@ -96,7 +96,7 @@ pub enum PlantEffect {
         joint: usize,
         /// By which share of itself it is higher and lower at most.
         share: f64,
-        /// Where it is highest, rad.
+        /// Position at which the friction is highest, rad.
         place: f64,
     },
     /// Somebody bolts something to the flange.
@@ -114,7 +114,7 @@ pub enum PlantEffect {
         joint: usize,
         /// Stiffness around rest, N·m/rad.
         stiffness: f64,
-        /// Where it is slack, rad.
+        /// Position at which the hose is slack, rad.
         rest: f64,
     },
     /// Torque that is periodic in the joint's position: teeth, wave generator, cogging.
@@ -125,7 +125,7 @@ pub enum PlantEffect {
         order: f64,
         /// Amplitude, N·m.
         amplitude: f64,
-        /// Where in a cycle the joint's zero lies, rad.
+        /// Phase of the ripple at the joint's zero, rad.
         phase: f64,
     },
     /// Lubricant that thins as the joints warm.
@@ -202,7 +202,7 @@ pub enum PlantEffect {
     },
 }
 
-/// What an effect may depend on at one instant.
+/// The quantities on which an effect may depend at one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Instant<'a> {
     /// Time, s.
@@ -219,7 +219,7 @@ pub struct Instant<'a> {
     pub dynamics: &'a Dynamics,
 }
 
-/// What an effect remembers along a motion.
+/// The memory of an effect along a motion.
 #[derive(Clone, Debug, Default)]
 pub struct State {
     /// The joint's last position, and how far each slider is wound up.
@@ -407,7 +407,7 @@ impl PlantEffect {
         }
     }
 
-    /// What the effect does to the logged positions and torques, n values a sample.
+    /// Applies the effect to the logged positions and torques, n values per sample.
     pub(super) fn distort(&self, q: &mut [f64], tau: &mut [f64], n: usize, period: f64) {
         match self {
             PlantEffect::EncoderOffset { joint, offset } => {

@@ -1,6 +1,6 @@
 //! All nodes over one plant: the other end of a bus.
 //!
-//! Also here: what a joint's module is.
+//! The module also describes a joint's module.
 
 use super::dictionary::Identity;
 use super::hand::Hand;
@@ -20,7 +20,7 @@ const TICK: Micros = 500;
 /// Share of the friction's steep part that the drives feed forward.
 const TUNED: f64 = 0.9;
 
-/// What a virtual arm is made of.
+/// The parts of a virtual arm.
 #[derive(Clone, Debug)]
 pub struct Setup {
     /// The plant with its effects.
@@ -263,7 +263,7 @@ fn speak(arm: &mut impl Peer, bus: &mut impl Bus) -> Result<(), BusError> {
 pub struct CurrentMode {
     /// The mode's number in 0x6060.
     pub mode: i8,
-    /// Where its set-point goes: i16, per mille of the rated current.
+    /// The object of its set-point: i16, per mille of the rated current.
     pub target: Object,
 }
 

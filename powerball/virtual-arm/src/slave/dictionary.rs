@@ -6,7 +6,7 @@ use powerball_bus::canopen::{NodeId, Object, objects};
 use powerball_bus::driver::dictionary::DataType;
 use powerball_bus::driver::lwa4p::DICTIONARY;
 
-/// What an object holds. Numbers of all widths are `i64`; unsigned ones keep their value.
+/// The value of an object. Numbers of all widths are `i64`; unsigned ones keep their value.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     /// A whole number.
@@ -32,7 +32,7 @@ pub struct Entry {
     pub mappable: bool,
     /// Lowest and highest number that may be written.
     pub range: [i64; 2],
-    /// What it holds.
+    /// The present value.
     pub value: Value,
 }
 

@@ -16,7 +16,7 @@ const SEARCH: (f64, f64) = (0.4, 2e-3);
 /// A profile position has arrived within this, rad.
 const ARRIVED: f64 = 2e-4;
 
-/// What the bus tells the drive, read from its dictionary at each tick.
+/// The commands from the bus to the drive, read from its dictionary at each tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Inputs {
     /// Target of profile position, rad.
@@ -65,7 +65,7 @@ pub(super) struct Drive {
     phase: f64,
     starving: f64,
     interpolating: bool,
-    /// Of the commutation search, s left, and where it began.
+    /// Remaining time of the commutation search, s; `search_from` is the position at which it began.
     search: f64,
     search_from: Option<f64>,
     /// Profile position: where to, what follows, whether the hand has been shaken.
@@ -81,7 +81,7 @@ pub(super) struct Drive {
     pub(super) brake_stuck: bool,
     /// Motor supply is there.
     pub(super) supply: bool,
-    /// What tripped the drive and was not reported yet.
+    /// The cause that tripped the drive, if it was not reported yet.
     pub(super) trip: Option<Trip>,
     /// Torque of the last tick, N·m.
     pub(super) torque: f64,

@@ -3,7 +3,7 @@
 use powerball_logs::motion::Motion;
 use std::sync::{Arc, Mutex};
 
-/// What the hand does in one tick.
+/// The action of the hand in one tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandSample {
     /// Since it took hold, s.
@@ -16,7 +16,7 @@ pub struct HandSample {
     pub torque: Vec<f64>,
 }
 
-/// What a hand has done so far.
+/// The actions of a hand so far.
 pub type HandLog = Arc<Mutex<Vec<HandSample>>>;
 
 /// A hand that pulls every joint along a path and lets go at its end. It takes hold when all joints are free: brakes open
@@ -37,7 +37,7 @@ pub struct Hand {
 const EVERY: u64 = 10;
 
 impl Hand {
-    /// A hand along a path, its spring (N·m/rad) and damper (N·m·s/rad); what it does goes into `log`.
+    /// A hand along a path, its spring (N·m/rad) and damper (N·m·s/rad); its actions are written to `log`.
     #[must_use]
     pub fn new(path: Motion, [stiffness, damping]: [f64; 2], log: HandLog) -> Hand {
         Hand { path, stiffness, damping, t: 0.0, ticks: 0, log }

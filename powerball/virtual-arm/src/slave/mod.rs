@@ -1,10 +1,10 @@
 //! The virtual arm on the bus: one CiA 402 slave a joint over one simulated plant.
 //!
-//! | module | what it is |
+//! | module | content |
 //! |---|---|
 //! | `dictionary` | the drive's objects, exactly those of the maker's DCF |
 //! | `server` | SDO |
-//! | `process` | PDOs and the device's rules for changing them; where a drive wants its joint to be |
+//! | `process` | PDOs and the device's rules for changing them; the demanded position of a joint |
 //! | `drive` | set-points, state machine, modes, brake, commutation search |
 //! | `node` | network management, heartbeats, emergencies; ties the others together |
 //! | `hand` | a hand that pulls the links along a path |
@@ -40,7 +40,7 @@ struct Sample {
     torque: f64,
 }
 
-/// What can be made to go wrong at a node.
+/// A fault that can be injected at a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// The node neither hears nor speaks; its drive continues with the last command. `false` ends it.
@@ -63,6 +63,6 @@ pub enum Fault {
     Statusword(Option<u16>),
     /// The brake closes and stays closed, whatever the drive commands. `false` ends it.
     BrakeStuck(bool),
-    /// Heartbeats stop while everything else goes on.
+    /// Heartbeats stop while everything else continues.
     NoHeartbeat(bool),
 }

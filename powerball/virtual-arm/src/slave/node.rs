@@ -1,4 +1,4 @@
-//! One node: network management, heartbeats, emergencies, and the drive's dictionary brought to life.
+//! One node: network management, heartbeats, emergencies, and the drive behind its dictionary.
 
 use super::arm::Module;
 use super::dictionary::{Dictionary, Value};
@@ -35,7 +35,7 @@ struct Watched {
 #[derive(Clone, Debug)]
 pub struct Node {
     module: Module,
-    /// What its servo is tuned to: inertia, kg·m², and Coulomb friction, N·m.
+    /// Tuning of its servo: inertia, kg·m², and Coulomb friction, N·m.
     tuned: [f64; 2],
     nmt: nmt::State,
     dictionary: Dictionary,
@@ -50,9 +50,9 @@ pub struct Node {
     next_heartbeat: Micros,
     boots_at: Option<Micros>,
     sample: Sample,
-    /// What the drive is commanded, as the dictionary had it when it was last written.
+    /// The commands of the drive, as they were when the dictionary was last written.
     inputs: Inputs,
-    /// What is made to go wrong.
+    /// The injected faults.
     silent: bool,
     mute_heartbeat: bool,
     refused: Option<Mode>,
@@ -119,7 +119,7 @@ impl Node {
         self.drive.brake_closed()
     }
 
-    /// Where the drive wants the joint to be: position, rad, and velocity, rad/s.
+    /// The demanded motion of the joint: position, rad, and velocity, rad/s.
     pub fn demand(&self) -> [f64; 2] {
         [self.drive.reference.position, self.drive.reference.velocity]
     }
@@ -407,7 +407,7 @@ impl Node {
         }
     }
 
-    /// What the encoder and the current sensor say.
+    /// Takes a sample of the encoder and the current sensor.
     pub(super) fn measure(&mut self, sample: Sample) {
         self.sample = sample;
     }

@@ -3,7 +3,7 @@
 //! As on the real drive a PDO is changed in pre-operational only, after its COB-ID was made invalid; its
 //! mapping only while it maps nothing.
 //!
-//! Also here: where a drive wants its joint to be.
+//! The module also computes the demanded position of a joint.
 
 use super::dictionary::Dictionary;
 use powerball_bus::canopen::pdo::{Entry, INVALID, Mapping};

@@ -94,7 +94,7 @@ impl Server {
                 }
             }
             (Request::Abort { .. }, _) => None,
-            // A segment that nobody began.
+            // A segment without a transfer.
             _ => abort(Object::new(0, 0), AbortCode::COMMAND),
         }
     }

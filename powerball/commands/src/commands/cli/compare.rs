@@ -79,7 +79,7 @@ impl Compare {
         self.accept.judge(&compared.unusable)
     }
 
-    /// A result as it is, or the fit of a log or a summary.
+    /// A result that is read, or the fit of a log or a summary.
     fn side(&self, path: &Path, arm: Option<&Arm>) -> Result<Side, Failure> {
         if path.is_dir() || is_json(path) {
             return Ok(Side::read(path)?);

@@ -29,7 +29,7 @@ pub(crate) struct DemoCommand {
     /// The effect by name instead of one that the seed draws.
     #[arg(long, value_name = "NAME")]
     effect: Option<String>,
-    /// Where two names fit equally well, also record the experiment that tells them apart, and let it decide.
+    /// If two names fit equally well, also record the experiment that distinguishes them, and let it decide.
     #[arg(long)]
     experiment: bool,
     /// Print the result as one JSON object on standard output.

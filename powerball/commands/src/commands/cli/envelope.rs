@@ -1,4 +1,4 @@
-//! What the commands that move the arm look at before it moves.
+//! Checks of the commands that move the arm, before it moves.
 
 use super::Failure;
 use super::excite::{FloorAt, floor};
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// The shoulder, which is the base frame's origin, stands 205 mm above what the arm is mounted on.
 const FLOOR: f64 = -0.2;
 
-/// What motions are checked against before the arm moves.
+/// The surroundings with which motions are checked before the arm moves.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Surroundings {
     /// The arm file: its geometry and limits, for the floor, the links and the torques; the built-in hardware arm

@@ -1,7 +1,8 @@
-//! What a program does, as events with levels: on standard error, and in a file or the system's journal.
+//! The event log of a program, with levels: on standard error, and in a file or the system's journal.
 //!
-//! Events come from where something happens (`tracing`), among them all that the driver of an arm says. Nothing waits
-//! for the disk: lines are written by a thread of their own, and are lost rather than that a cycle is late.
+//! Events come from the code in which something happens (`tracing`), among them all notes of the driver of an
+//! arm. Nothing waits for the disk: a separate thread writes lines, and lines are lost rather than a cycle
+//! delayed.
 
 use super::{Failure, output};
 use clap::Args;
@@ -73,7 +74,7 @@ impl Events {
     }
 }
 
-/// Lines that another thread writes: a pipe that nobody reads, or a disk that is busy, holds up no cycle.
+/// Lines that another thread writes: a pipe without a reader, or a busy disk, delays no cycle.
 fn unhurried(to: impl Write + Send + 'static) -> (NonBlocking, WorkerGuard) {
     NonBlockingBuilder::default().lossy(true).finish(to)
 }

@@ -39,7 +39,7 @@ impl From<Set> for SetKind {
     }
 }
 
-/// What is optimised.
+/// Criterion of the optimisation.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Goal {
     /// Condition number and 1/σ_min of the regressor (Eq. 17).
@@ -79,10 +79,10 @@ pub(crate) struct Excite {
     /// The parameter set whose regressor is to be well conditioned.
     #[arg(long, value_enum, default_value = "minimal")]
     parameters: Set,
-    /// Where the trajectory is written, CSV.
+    /// File for the trajectory, CSV.
     #[arg(long)]
     out: PathBuf,
-    /// Where a page with figures is written, HTML.
+    /// File for a page with figures, HTML.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
     /// Duration of one period of the Fourier series, s.
@@ -124,8 +124,8 @@ pub(crate) struct Excite {
     #[arg(long)]
     no_collision: bool,
     /// The arm's masses for the torque limits: an identified.json, or a values file `{"parameter": number,
-    /// …}`. Without it they are those of ARM.values.json, which `dyngen import` writes next to the arm file; else they
-    /// are guessed from the capsules.
+    /// …}`. Without it they are those of ARM.values.json, which `dyngen import` writes next to the arm file;
+    /// else they are estimated from the capsules.
     #[arg(long, value_name = "FILE.json", conflicts_with = "no_torque")]
     values: Option<PathBuf>,
     /// Ignore torque limits.
@@ -203,7 +203,7 @@ impl Excite {
         }
     }
 
-    /// As said, else those that an import has written next to the arm file.
+    /// The masses of the option, else those that an import has written next to the arm file.
     fn masses(&self) -> Result<MassSource, Failure> {
         let imported = self.arm.with_extension("values.json");
         let path = match &self.values {

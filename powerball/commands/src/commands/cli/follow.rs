@@ -83,7 +83,7 @@ pub(crate) struct FollowCommand {
     out: PathBuf,
 }
 
-/// One of the runs: its name, its model, and what it predicts for the path.
+/// One of the runs: its name, its model, and the torques that it predicts for the path.
 struct Entry {
     name: &'static str,
     model: ModelArm,
@@ -139,7 +139,7 @@ impl FollowCommand {
         let guard = if self.give > 0.0 { guard.with_push(PUSH) } else { guard };
         let entries = self.entries(&arm, model, &path)?;
         output::make_folder(&self.out)?;
-        // The explained model, which is the last, says what all runs are held against.
+        // All runs are compared with the torques of the explained model, which is the last one.
         let best = entries.last().and_then(|entry| entry.parts.clone()).unwrap_or_default();
         let live = self.serve.open()?;
         let (mut shown, mut seconds) = (0, 0.0);

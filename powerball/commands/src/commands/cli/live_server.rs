@@ -1,8 +1,8 @@
 //! The server behind `--serve`.
 //!
-//! It stands in the process that holds the arm, so it gives everybody little: GET alone, no bodies, short requests, few
-//! connections, short waits; and what it shows only to who has the token of the printed address. It has one thread of
-//! its own, and the cycle never waits for it.
+//! It runs in the process that moves the arm, so it accepts little: only GET, no bodies, short requests, few
+//! connections, short waits; and it shows its page only to a client with the token of the printed address. It
+//! has its own thread, and the cycle never waits for it.
 
 use crate::report::stream_page;
 use hyper::body::{Body, Bytes, Frame, Incoming, SizeHint};
@@ -37,10 +37,10 @@ const PATIENCE: Duration = Duration::from_secs(3);
 /// Messages that late pages still get; the oldest samples go first.
 const MOST: usize = 50_000;
 
-/// Answers at `listener` until nobody can send a message any more; every page gets every message.
+/// Answers at `listener` until all senders of messages are gone; every page gets every message.
 ///
 /// # Errors
-/// Where the system lets nothing be waited for.
+/// If the system cannot wait for connections.
 pub(super) fn serve(
     listener: std::net::TcpListener,
     token: &str,
@@ -62,7 +62,8 @@ pub(super) fn serve(
     })
 }
 
-/// What a browser of this machine may call the server; a name of somebody's domain that leads here is none of these.
+/// The host names of the server for a browser on this machine; a name of another domain that points here is
+/// not among them.
 fn hosts(at: SocketAddr) -> Vec<String> {
     let port = at.port();
     let names = ["127.0.0.1".to_string(), "[::1]".to_string(), "localhost".to_string()];
@@ -312,7 +313,7 @@ mod tests {
         let gone = MOST / 10 - 1;
         assert_eq!(history.messages.len(), MOST + 1 - gone);
         assert_eq!(history.get(0), Some((word(0), 1)));
-        // What it would have had next is gone.
+        // The message that it would have got next is gone.
         assert_eq!(history.get(1), Some((word(gone + 1), gone + 2)));
         assert_eq!(history.get(7), Some((word(gone + 1), gone + 2)));
         assert_eq!(history.get(MOST), Some((word(MOST), MOST + 1)));

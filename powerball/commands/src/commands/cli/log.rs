@@ -1,4 +1,4 @@
-//! `powerball log`: what is in a file and what it is taken to be.
+//! `powerball log`: the content of a file and its interpretation.
 
 use super::inputs::MapArgument;
 use super::{Failure, output, replace};
@@ -226,7 +226,7 @@ pub(super) fn write(log: &Log, arm: &Arm, model: Option<&Path>, out: &Path) -> R
     layouts::write(out, held).map_err(failed)
 }
 
-/// The names of an arm's joints as an MCAP has them: those of the arm file, else `joint1` and so on.
+/// The names of an arm's joints in an MCAP: those of the arm file, else `joint1` and so on.
 pub(super) fn joint_names(arm: &Arm) -> Vec<String> {
     match arm.moving_joints().all(|joint| joint.name.is_some()) {
         true => arm.joint_names(),

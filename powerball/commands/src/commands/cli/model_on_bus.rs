@@ -1,4 +1,4 @@
-//! What `follow` and `float` take: an arm with a torque model, and the bus that it is on.
+//! The arm with a torque model, and its bus, for `follow` and `float`.
 
 use super::Failure;
 use super::bus::{Consent, Where, virtual_bus};
@@ -73,7 +73,7 @@ impl ModelOnBus {
         self.plant.clone().or_else(|| self.surroundings.arm.as_deref().and_then(Undeclared::next_to))
     }
 
-    /// What the plant of --bus virtual is called; nothing on other buses.
+    /// The name of the plant of --bus virtual; `None` on other buses.
     pub(crate) fn plant(&self) -> Option<String> {
         let file = || self.plant_file().map_or("built-in".to_string(), |file| file.display().to_string());
         (self.place.bus == BusUrl::Virtual).then(file)
@@ -103,7 +103,7 @@ impl ModelOnBus {
     }
 }
 
-/// What went wrong with a trajectory's file, or with the arm.
+/// The failure for an error of a trajectory's file, or of the arm.
 pub(crate) fn failed(e: RecordError, file: &Path) -> Failure {
     match e {
         RecordError::Motion(what) => Failure::Unusable(format!("{}: {what}", file.display())),

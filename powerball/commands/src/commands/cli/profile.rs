@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 /// Make the bus driver's constant tables of an arm: a Rust file.
 ///
-/// The DCF (or EDS) is the drive maker's; the TOML says what it cannot know of the arm: nodes, rate, mapping,
-/// limits, scales. Without counts per degree in the TOML they are computed from 0x608F, 0x6091 and 0x6092 of
-/// the DCF; a mode that the TOML leaves out is not required of the drives.
+/// The DCF (or EDS) is the drive maker's; the TOML adds the data of the arm: nodes, rate, mapping, limits,
+/// scales. Without counts per degree in the TOML they are computed from 0x608F, 0x6091 and 0x6092 of the DCF;
+/// a mode that the TOML leaves out is not required of the drives.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  powerball profile --dcf Schunk_0_63.dcf --arm powerball/lwa4p_bus.toml \
         --constant LWA4P -o lwa4p.rs")]
@@ -17,7 +17,7 @@ pub(super) struct ProfileCommand {
     /// The drive's DCF or EDS.
     #[arg(long, value_name = "FILE")]
     dcf: PathBuf,
-    /// More DCFs, whose values go over those of the first.
+    /// More DCFs, whose values replace those of the first.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     overlay: Vec<PathBuf>,
     /// The arm's TOML.
@@ -26,10 +26,10 @@ pub(super) struct ProfileCommand {
     /// Name of the constant.
     #[arg(long, default_value = "ARM")]
     constant: String,
-    /// What the file's head calls its source; the file names unless given.
+    /// Name of the source in the file's head; by default the file names.
     #[arg(long)]
     source: Option<String>,
-    /// Where to write.
+    /// File to write.
     #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
 }

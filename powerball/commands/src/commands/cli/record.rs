@@ -35,7 +35,7 @@ pub(crate) struct RecordCommand {
     /// The trajectory: CSV with t, q1…q6 (rad), as `powerball excite` writes it at the arm's rate.
     #[arg(long, value_name = "FILE")]
     trajectory: PathBuf,
-    /// Where the log is written: Parquet or MCAP where the name ends in .parquet or .mcap, CSV else.
+    /// File for the log: Parquet or MCAP if the name ends in .parquet or .mcap, else CSV.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// How the base stands: filed, ROLL,PITCH in degrees, or gravity in the base frame as X,Y,Z in m/s².

@@ -1,7 +1,8 @@
 //! Which files a command may replace: those that the same command made, and others with `--force`.
 //!
-//! A page says in its head or its foot what made it; a JSON object is recognised by the keys of its result, any other text by its
-//! first line, which is its header. A log is never recognised: it may be the only one of its kind.
+//! A page names in its head or its foot the program that made it; a JSON object is recognised by the keys of
+//! its result, any other text by its first line, which is its header. A log is never recognised: it may be
+//! the only one of its kind.
 
 use super::Failure;
 use serde_json::Value;
@@ -29,7 +30,8 @@ const RESULTS: [(&str, &str); 9] = [
     ("consistent.json", ""),
 ];
 
-/// Refuses a folder whose files of a result's names are none of it, before anything is computed.
+/// Refuses a folder that has files with a result's names but from another source, before anything is
+/// computed.
 pub(super) fn check_folder(folder: &Path) -> Result<(), Failure> {
     let pages = std::iter::once("report.html");
     let mut names = RESULTS.iter().map(|(name, _)| *name).chain(pages);

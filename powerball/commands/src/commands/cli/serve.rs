@@ -1,7 +1,7 @@
-//! `--serve`: a page that shows a motion while it goes on.
+//! `--serve`: a page that shows a motion while it runs.
 //!
-//! Who comes late gets what was before. Nothing here is waited for by the cycle: what is sent goes into a queue that has an
-//! end, and is lost where the server has no time for it.
+//! A page that is opened late gets the earlier samples. The cycle waits for nothing here: messages go into a
+//! finite queue, and are lost if the server has no time for them.
 
 use super::{Failure, live_server};
 use clap::Args;
@@ -18,11 +18,11 @@ const QUEUE: usize = 1000;
 /// For pages to take the last messages before the program ends.
 const GOODBYE: Duration = Duration::from_millis(500);
 
-/// Where the page is.
+/// The address of the page.
 #[derive(Args, Clone, Debug)]
 pub(super) struct Serve {
-    /// Show the motion on a page while it goes on, at this address of this machine; --bus virtual then takes real time. The
-    /// page's whole address, with the token that it asks for, is printed.
+    /// Show the motion on a page while it runs, at this address of this machine; --bus virtual then takes
+    /// real time. The page's whole address, with the token that it needs, is printed.
     #[arg(long, value_name = "127.0.0.1:PORT")]
     serve: Option<SocketAddr>,
 }
@@ -89,7 +89,7 @@ impl Live {
         }
     }
 
-    /// What there is to see: fields with their units, each with a value by joint in every sample.
+    /// Announces the fields of the page with their units; each has a value by joint in every sample.
     pub(super) fn start(&self, title: &str, fields: &[(&str, &str)]) {
         let fields: serde_json::Map<String, Value> =
             fields.iter().map(|(name, unit)| ((*name).to_string(), json!(unit))).collect();

@@ -1,4 +1,4 @@
-//! `powerball completions` and `powerball man`: what a shell and `man` know of this program.
+//! `powerball completions` and `powerball man`: completions for a shell and manual pages of this program.
 
 use super::{Cli, Failure, output};
 use clap::{Args, CommandFactory};

@@ -146,11 +146,11 @@ impl WarmUp {
 }
 
 impl WarmUp {
-    /// What a warm-up in the same folder showed that was not finished, and the time at which this one goes
-    /// on, s; nothing and 0 where it begins anew.
+    /// The result of an unfinished warm-up in the same folder, and the time at which this one continues, s;
+    /// nothing and 0 if it starts from the beginning.
     ///
-    /// An arm cools about as slowly as it warms: it is taken for as warm as it was if it has stood for less
-    /// than a fifth of the time that it was swung for. What little it cooled shows in the trend.
+    /// An arm cools about as slowly as it warms: it counts as warm as before if it has stood for less than a
+    /// fifth of the time of its swinging. The small cooling shows in the trend.
     fn earlier(&self, settings: &Settings) -> (Seen, f64) {
         let path = self.out.join("warm_up.csv");
         let nothing = || Seen::new(swing(&LWA4P, settings));
@@ -161,12 +161,12 @@ impl WarmUp {
         let (Some(last), Some(stood)) = (rows.last().map(|row| row[0]), resume::silence(&path)) else {
             return (nothing(), 0.0);
         };
-        // Virtual time does not pass while nobody looks.
+        // Virtual time does not pass between commands.
         let stood = if self.place.bus == BusUrl::Virtual { 0.0 } else { stood };
         if finished || stood > 0.2 * last {
             return (nothing(), 0.0);
         }
-        // A second lies between what was broken off and what goes on.
+        // A second lies between the interrupted part and the continued one.
         nothing().earlier(&rows).map_or((nothing(), 0.0), |seen| (seen, last + stood.max(1.0)))
     }
 }

@@ -22,7 +22,8 @@ use std::path::Path;
 const PERIOD: f64 = 8.5;
 /// Condition numbers count for nothing here: the best of a few paths will do.
 const EVALUATIONS: usize = 50;
-/// Paths go up to the joints' limits, and an arm that is off its path passes them: this share of the velocities leaves room.
+/// Paths go up to the joints' limits, and an arm that is off its path passes them: this share of the
+/// velocities leaves a margin.
 const PACE: f64 = 0.8;
 /// A path may take more torque of a joint than it has, by one of the models; this many are tried.
 const PATHS: u64 = 8;

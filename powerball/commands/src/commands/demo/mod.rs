@@ -1,5 +1,5 @@
-//! The whole loop on the virtual arm: an effect that the model lacks, found again from the logs alone, and the arm
-//! moved with what was found.
+//! The whole loop on the virtual arm: an effect that the model lacks, found again from the logs alone, and
+//! the arm moved with the explained model.
 
 mod driven;
 mod session;
@@ -24,12 +24,12 @@ pub use session::{Session, SessionError};
 use std::path::{Path, PathBuf};
 pub use verdict::{Judgement, Verdict, page};
 
-/// What was in the plant, what was found, and whether that is right.
+/// The effect in the plant, the effects found, and whether they are right.
 #[derive(Debug)]
 pub struct Demo {
     /// The recording session with the truth.
     pub session: Session,
-    /// What the residual loop finds in the logs, which are all that it was given.
+    /// The explanation of the logs, from the logs alone.
     pub explained: Explained,
     /// Both compared.
     pub verdict: Verdict,
@@ -89,12 +89,12 @@ pub fn names<'a>() -> Vec<&'a str> {
 }
 
 /// Records a session with an effect drawn by `seed`, or with the one of the given name, into `folder`, and
-/// explains it from the files alone, as a user would. Then the same arm is moved with the base model and with the explained
-/// one. Where names stay open, the trajectory that tells them
-/// apart is written there as well, and `with_experiment` runs it on the same arm and lets it decide.
+/// explains it from the files alone, as a user would. Then the same arm is moved with the base model and with
+/// the explained one. If names stay open, the trajectory that distinguishes them is written there as well,
+/// and `with_experiment` runs it on the same arm and lets it decide.
 ///
 /// # Errors
-/// Only where something broke; a wrong name is a result.
+/// Only if a step failed; a wrong name is a result.
 pub fn run(
     folder: &Path,
     seed: u64,

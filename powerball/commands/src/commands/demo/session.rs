@@ -1,5 +1,5 @@
 //! A recording session on the virtual arm: several exciting paths, some to fit and some to hold out, with an
-//! effect that nobody tells the model. The arm is on a CAN bus in memory and is driven and recorded as the
+//! effect that the model does not know. The arm is on a CAN bus in memory and is driven and recorded as the
 //! real one is.
 
 use crate::procedure::{Columns, Envelope, LogTime, RecordError, Recorder, way};
@@ -42,12 +42,12 @@ const EVALUATIONS: usize = 300;
 /// Paths are drawn this many times where the arm is stopped on them.
 const ATTEMPTS: u64 = 6;
 
-/// What was recorded.
+/// The recorded logs, with the effect in the plant.
 #[derive(Clone, Debug)]
 pub struct Session {
     /// The plant with its effect.
     pub plant: Plant,
-    /// What is in the plant and not in the model.
+    /// The effect in the plant that the model does not have.
     pub effect: Effect,
     /// The effect as a file, with the arm's age at the end of the session.
     pub undeclared: Undeclared,

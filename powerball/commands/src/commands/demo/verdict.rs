@@ -1,6 +1,6 @@
-//! Whether what was found is what is there.
+//! The verdict of the demo: whether the effects found are those in the plant.
 //!
-//! Also here: the demo as a page.
+//! The module also writes the demo as a page.
 
 use super::Demo;
 use crate::report::explained::add_to_page;
@@ -34,7 +34,7 @@ pub struct Verdict {
     pub joints: Vec<usize>,
     /// The effect's figures.
     pub figures: String,
-    /// What was named: effect and joints.
+    /// The named effects with their joints.
     pub named: Vec<(String, Vec<usize>)>,
 }
 
@@ -71,12 +71,12 @@ impl Verdict {
         }
     }
 
-    /// What is in the plant, in words.
+    /// The effect in the plant, in words.
     pub fn truth_in_words(&self) -> String {
         format!("{}{}: {}", self.truth, at(&self.joints), self.figures)
     }
 
-    /// What was named, in words.
+    /// The named effects, in words.
     pub fn named_in_words(&self) -> String {
         if self.named.is_empty() {
             return "nothing".to_string();

@@ -1,4 +1,5 @@
-//! A run that is asked to end, at every moment of it: what leaves then, and how the arm is left.
+//! A run that is asked to end, at every moment of it: the frames that are sent then, and the state of the
+//! arm.
 
 use super::tests::{master_on, numeric, parts, path, setup};
 use super::*;

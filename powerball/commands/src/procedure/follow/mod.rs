@@ -42,7 +42,7 @@ pub enum Law<const N: usize> {
 }
 
 impl<const N: usize> Law<N> {
-    /// As `powerball follow --with` has it.
+    /// The name in `powerball follow --with`.
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
@@ -102,16 +102,16 @@ fn listed<const N: usize>(q: &SVector<f64, N>) -> String {
     q.iter().map(|q| format!("{q:.2}")).collect::<Vec<_>>().join(", ")
 }
 
-/// What one run needs.
+/// The input of one run.
 #[derive(Debug)]
 pub struct Run<'a, M, const N: usize> {
     /// The path.
     pub path: &'a Path<N>,
     /// The rigid arm: its inertia shapes the gains, its torque is fed forward where `parts` are.
     pub arm: &'a M,
-    /// What the model predicts for the path; `None` for feedback alone.
+    /// The torques that the model predicts for the path; `None` for feedback alone.
     pub parts: Option<&'a Parts<N>>,
-    /// What the best model that is known predicts for it: how far the arm may be off the path in current
+    /// The torques that the best known model predicts for it: they give the tolerance of the path in current
     /// mode.
     pub best: &'a Parts<N>,
     /// How far, rad, a push may take a joint off the path next to that.

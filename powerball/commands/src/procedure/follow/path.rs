@@ -1,4 +1,4 @@
-//! A path that is cleared to be driven, and what a model predicts for it.
+//! A path that passed all checks, and the torques that a model predicts for it.
 
 use crate::procedure::{Cleared, Envelope, RecordError};
 use nalgebra::SVector;
@@ -9,14 +9,14 @@ use powerball_logs::motion::Motion;
 /// Cycles at rest before and after a path, in which what is fed forward comes and goes.
 pub(super) const REST: usize = 100;
 
-/// What the model predicts for a path, a vector a sample, N·m.
+/// The torques that the model predicts for a path, one vector per sample, N·m.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parts<const N: usize> {
     /// The rigid arm.
     pub rigid: Vec<SVector<f64, N>>,
     /// Eq. 16.
     pub friction: Vec<SVector<f64, N>>,
-    /// What goes beyond both.
+    /// Torque of the effects, in addition to the rigid arm and friction.
     pub effects: Vec<SVector<f64, N>>,
 }
 
@@ -26,7 +26,7 @@ impl<const N: usize> Parts<N> {
         between(&self.rigid, at) + self.losses(at)
     }
 
-    /// What is not the rigid arm's.
+    /// The torque in addition to that of the rigid arm: friction and effects.
     pub(super) fn losses(&self, at: f64) -> SVector<f64, N> {
         between(&self.friction, at) + between(&self.effects, at)
     }
@@ -94,7 +94,7 @@ impl<const N: usize> Path<N> {
         self.motion.motion()
     }
 
-    /// Where it begins.
+    /// The position at which the path begins.
     #[must_use]
     pub fn start(&self) -> SVector<f64, N> {
         self.reference.first().map_or_else(SVector::zeros, |r| r.q)

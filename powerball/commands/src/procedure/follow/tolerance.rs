@@ -1,5 +1,5 @@
-//! How far a joint may be from its path in current mode before the arm is stopped: by the gains of the law and by what the
-//! feedback has to make up for.
+//! How far a joint may be from its path in current mode before the arm is stopped: by the gains of the law
+//! and by the torque that the feedback must supply.
 
 use super::path::{Parts, between};
 use nalgebra::{SMatrix, SVector};
@@ -27,8 +27,9 @@ pub(super) struct Tolerance<const N: usize> {
 }
 
 impl<const N: usize> Tolerance<N> {
-    /// Of a path for which `fed` is fed forward, or nothing, and that needs `best` by the best model that is known. `limits`
-    /// are the joints' torques, N·m; `give` is how far a push may take a joint off the path, rad.
+    /// The tolerance of a path for which `fed` is fed forward, or nothing, and that needs `best` by the best
+    /// known model. `limits` are the joints' torques, N·m; `give` is how far a push may take a joint off the
+    /// path, rad.
     pub(super) fn new(fed: Option<&Parts<N>>, best: &Parts<N>, limits: &SVector<f64, N>, give: f64) -> Self {
         let greatest = |series: &mut dyn Iterator<Item = SVector<f64, N>>| {
             series.fold(SVector::zeros(), |most: SVector<f64, N>, x| most.sup(&x))

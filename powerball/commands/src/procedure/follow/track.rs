@@ -1,4 +1,4 @@
-//! What came of a path that was driven: positions, torques by what they are for, and errors as figures.
+//! The result of a driven path: positions, torques by their cause, and errors as figures.
 
 use super::Law;
 use super::path::{Path, REST};
@@ -13,9 +13,9 @@ pub struct Sample<const N: usize> {
     pub t: f64,
     /// Measured positions, rad.
     pub q: SVector<f64, N>,
-    /// What was fed forward, by part, N·m: rigid arm, friction, effects.
+    /// Feed-forward torque by part, N·m: rigid arm, friction, effects.
     pub forward: [SVector<f64, N>; 3],
-    /// What the feedback added, N·m: the drives' own in interpolated position mode.
+    /// Torque of the feedback, N·m: that of the drives in interpolated position mode.
     pub feedback: SVector<f64, N>,
     /// External torque by the momentum observer, N·m; nothing in interpolated position mode.
     pub external: Option<SVector<f64, N>>,
@@ -26,7 +26,7 @@ pub struct Sample<const N: usize> {
 pub struct Track<const N: usize> {
     /// Cycles of the path itself.
     pub samples: Vec<Sample<N>>,
-    /// What touched the arm, which was stopped then.
+    /// The contact that stopped the arm.
     pub contact: Option<Touched>,
     /// Cycles in which data of a joint was missing and its state was carried on, in current mode.
     pub carried_on: u64,
@@ -41,7 +41,7 @@ pub struct Touched {
     pub joint: usize,
     /// N·m.
     pub torque: f64,
-    /// It is on this link, from 1, or beyond it.
+    /// The contact is on this link, from 1, or beyond it.
     pub link: usize,
 }
 
@@ -87,7 +87,7 @@ pub fn common_delay<const N: usize>(tracks: &[&Track<N>], path: &Path<N>) -> f64
     tries.map(|d| (misfit(d), d)).fold((f64::INFINITY, 0.0), |a, b| if b.0 < a.0 { b } else { a }).1
 }
 
-/// What came of following a path with one or several models; the keys of the maps name them.
+/// The result of following a path with one or several models; the keys of the maps name them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Followed {
     /// The arm's name.
@@ -100,7 +100,7 @@ pub struct Followed {
     pub largest_error: BTreeMap<String, Vec<f64>>,
     /// The delay, s, with which drives follow set-points, the same for all runs; 0 in current mode.
     pub delay: f64,
-    /// Root mean square of the torque by joint, N·m, by what it is for.
+    /// Root mean square of the torque by joint, N·m, by its cause.
     pub torque: BTreeMap<String, TorqueParts>,
     /// Bandwidth of the feedback, rad/s, and the largest pole of its sampled loop, where this program closes it.
     pub bandwidth: Option<f64>,
@@ -167,7 +167,7 @@ pub struct TorqueParts {
     pub friction: Vec<f64>,
     /// For the effects.
     pub effects: Vec<f64>,
-    /// What the feedback added.
+    /// Torque of the feedback.
     pub feedback: Vec<f64>,
     /// External torque that the observer sees, where it ran.
     pub external: Option<Vec<f64>>,

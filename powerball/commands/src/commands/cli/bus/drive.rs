@@ -139,7 +139,7 @@ impl Stop {
         #[cfg(unix)]
         if self.watchdog {
             let open = || transport::open(&self.place.bus).map_err(refused);
-            // That it can be opened is seen now. Then it is opened anew, with nothing old to read.
+            // This shows that it can be opened. Then it is opened again, without old data to read.
             drop(open()?);
             transport::Watchdog::wait().map_err(refused)?;
             return open();

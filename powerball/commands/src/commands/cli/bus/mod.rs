@@ -1,4 +1,4 @@
-//! `powerball bus`: look at a CAN bus, and move what is on it.
+//! `powerball bus`: show a CAN bus, and move the drives on it.
 
 mod drive;
 mod scan;
@@ -76,7 +76,7 @@ pub(crate) struct Where {
     pub(crate) json: bool,
 }
 
-/// What a command that configures drives may accept.
+/// Options of a command that configures drives.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct Consent {
     /// You accept what was not verified: drives whose device type (0x1000) or identity (0x1018) is another than the
@@ -102,8 +102,9 @@ impl Where {
 
     /// A driver of the arm on an open bus.
     ///
-    /// UDP multicast is a bench: nobody promises a program its time slices there, and no arm is hurt by a
-    /// late SYNC. The driver then tolerates what it would not on a real bus; it still counts it.
+    /// UDP multicast is a test bench: a program has no guaranteed time slices there, and a late SYNC harms no
+    /// arm. The driver then tolerates late SYNCs that it would not tolerate on a real bus; it still counts
+    /// them.
     pub(crate) fn driver(
         &self,
         bus: Box<dyn Bus>,
@@ -112,7 +113,7 @@ impl Where {
         self.driver_of(LWA4P, bus, consent)
     }
 
-    /// As [`Self::driver`], with another profile.
+    /// Like [`Self::driver`], with another profile.
     pub(crate) fn driver_of(
         &self,
         mut profile: Profile<6>,

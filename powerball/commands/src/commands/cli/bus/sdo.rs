@@ -126,7 +126,7 @@ impl Write {
     fn run(self) -> Result<(), Failure> {
         let Address { node, object, .. } = self.address;
         let mut bus = self.place.open()?;
-        // Where nobody knows the type, the node's own answer has the width.
+        // If the type is not known, the node's own answer gives the width.
         let kind = match self.address.data_type() {
             Some(kind) => kind,
             None => match blocking::read(&mut *bus, node, object)?.as_slice().len() {
