@@ -21,7 +21,7 @@ const ROUNDING: f64 = 1e-10;
 /// The verdict on a set of values.
 #[derive(Clone, Debug)]
 pub struct Possibility {
-    /// Whether nothing speaks against the values.
+    /// Whether there is no reason against the values.
     pub possible: bool,
     /// The reasons why they are impossible.
     pub reasons: Vec<String>,

@@ -111,7 +111,7 @@ impl Quantities<'_> {
 }
 
 impl Source<Numerator> for Quantities<'_> {
-    // Only one joint is looked at at a time, so all share their variables.
+    // Only one joint is treated at a time, so all share their variables.
     fn joint_trig(&mut self, _: usize) -> (Numerator, Numerator) {
         (self.ring.variable(self.first + SIN), self.ring.variable(self.first + COS))
     }

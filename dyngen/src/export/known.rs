@@ -15,7 +15,7 @@ const ROUNDING: f64 = 1e-10;
 pub struct Friction {
     /// Viscous friction, N·m·s/rad or N·s/m; `None` if it is not to be written.
     pub viscous: Option<f64>,
-    /// N·m or N: what saturating terms come to.
+    /// Sum of the saturating terms, N·m or N.
     pub coulomb: f64,
     /// Standard errors of both; if a file lacks that of the sum of saturating terms, the sum of their errors
     /// is taken, which is an upper limit.
@@ -137,7 +137,7 @@ fn words(arm: &Arm, json: &Value) -> Vec<Vec<String>> {
     words
 }
 
-/// Eq. 16 of the paper, γ1 tanh(γ2 q̇) + γ3 tanh(γ4 q̇) + γ5 q̇: its saturating terms come to γ1 + γ3.
+/// Eq. 16 of the paper, γ1 tanh(γ2 q̇) + γ3 tanh(γ4 q̇) + γ5 q̇: the sum of its saturating terms is γ1 + γ3.
 fn read_friction(arm: &Arm, json: &Value) -> Result<Vec<Option<Friction>>, String> {
     let list = json.get("friction").and_then(Value::as_array);
     let list = list.ok_or_else(|| "it has no list 'friction'".to_string())?;

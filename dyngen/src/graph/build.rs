@@ -1,4 +1,4 @@
-//! Building expressions: each once, folded as it is built.
+//! Building expressions: each once, folded when it is built.
 
 use super::{Expr, Graph, Input, Node};
 use crate::exact::algebra::Algebra;

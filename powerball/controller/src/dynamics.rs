@@ -130,7 +130,7 @@ pub struct Reference<T, const N: usize> {
 }
 
 impl<T: RealField + Copy, const N: usize> Reference<T, N> {
-    /// At rest at a position.
+    /// A reference at rest at a position.
     #[must_use]
     pub fn at_rest(q: SVector<T, N>) -> Self {
         Reference { q, dq: SVector::zeros(), ddq: SVector::zeros() }

@@ -233,7 +233,7 @@ struct Plant<'a, const N: usize> {
 }
 
 impl<'a, const N: usize> Plant<'a, N> {
-    /// At rest where the path begins.
+    /// The arm at rest where the path begins.
     fn new(on: &'a ModelOnArm<N>, path: &Motion) -> Self {
         let terms: Vec<Term<f64>> = on.model.terms().iter().map(|t| t.term).collect();
         let q = SVector::from_fn(|j, _| path.q.get(j).copied().unwrap_or(0.0));
@@ -304,7 +304,7 @@ impl<'a, const N: usize> Plant<'a, N> {
 mod tests {
     use super::*;
 
-    /// Of 2 kg at 0.5 m, in a plane with gravity along −y.
+    /// A pendulum of 2 kg at 0.5 m, in a plane with gravity along −y.
     const ARM: &str = "name = \"pendulum\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n[[joint]]\nkind = \"revolute\"\n\
         a = 0.5\nalpha = 0\nd = 0\ntheta = 0\n";
     const INERTIA: f64 = 0.5;

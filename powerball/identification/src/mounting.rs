@@ -6,7 +6,7 @@ use nalgebra::{Rotation3, Vector3};
 use std::fmt;
 use std::str::FromStr;
 
-/// How the base stands for a trajectory or for a log of one.
+/// The mounting of the base for a trajectory or for a log of one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Mounting {
     /// The mounting that the gravity of the arm file gives.

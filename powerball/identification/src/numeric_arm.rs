@@ -47,7 +47,7 @@ impl<const N: usize> NumericArm<N> {
         NumericArm { held: Some(Box::new(held)), ..self }
     }
 
-    /// What the held body adds.
+    /// Adds the part of the held body.
     fn with_held<M: std::ops::Add<Output = M>>(&self, own: M, of: impl Fn(&NumericArm<N>) -> M) -> M {
         match &self.held {
             Some(held) => own + of(held),

@@ -48,13 +48,13 @@ impl<'a> Source<'a> {
         Source::from(path.into())
     }
 
-    /// This source, recorded with the base mounted so.
+    /// This source with another mounting of the base.
     #[must_use]
     pub fn mounted(self, mounting: Mounting) -> Source<'a> {
         Source { mounting: Some(mounting), ..self }
     }
 
-    /// This source, its columns read so.
+    /// This source with another map of its columns.
     #[must_use]
     pub fn mapped(self, map: Arc<ColumnMap>) -> Source<'a> {
         Source { map, ..self }

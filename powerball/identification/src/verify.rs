@@ -23,7 +23,7 @@ pub struct VerifyOptions<'a> {
     pub joint_bands: Vec<f64>,
     /// How logs are filtered and cut into blocks.
     pub data: DataOptions,
-    /// Where progress is reported.
+    /// The receiver of progress reports.
     pub progress: Progress<'a>,
 }
 

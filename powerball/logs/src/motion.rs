@@ -37,7 +37,7 @@ impl Motion {
         self.q.is_empty()
     }
 
-    /// From the first to the last sample, s.
+    /// Time from the first to the last sample, s.
     pub fn duration(&self) -> f64 {
         self.len().saturating_sub(1) as f64 * self.period
     }
@@ -68,11 +68,11 @@ impl Motion {
         parts.map(|((q, dq), ddq)| [q, dq, ddq])
     }
 
-    /// From CSV with the columns `t` (s, evenly spaced) and `q1…qn`; `dq` and `ddq` are taken where they are
-    /// all there, and are zero otherwise.
+    /// Reads CSV with the columns `t` (s, evenly spaced) and `q1…qn`; `dq` and `ddq` are read if all of them
+    /// are there, and are zero otherwise.
     ///
     /// # Errors
-    /// The line that is wrong, and why.
+    /// The wrong line, and the reason.
     pub fn from_csv(text: &str, dof: usize) -> Result<Motion, String> {
         let mut lines = text.lines().enumerate();
         let header: Vec<&str> =

@@ -18,7 +18,7 @@ pub struct Dynamics {
     bodies: Vec<Body>,
 }
 
-/// What moves and what pushes: the arguments of one pass of the recursion.
+/// Motion and external forces: the arguments of one pass of the recursion.
 #[derive(Clone, Copy)]
 struct Pass<'a> {
     q: &'a [f64],
@@ -301,7 +301,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// From `m mx my mz Ixx Ixy Ixz Iyy Iyz Izz Im`.
+    /// The body from `m mx my mz Ixx Ixy Ixz Iyy Iyz Izz Im`.
     pub fn from_parameters(p: &[f64; PER_LINK]) -> Self {
         let [mass, mx, my, mz, xx, xy, xz, yy, yz, zz, rotor] = *p;
         Body {

@@ -14,7 +14,7 @@ use std::ops::Range;
 /// The arm file of the hardware, which the virtual arm follows to the letter.
 pub const ARM_FILE: &str = include_str!("../lwa4p.toml");
 
-/// From the wrist's centre to the flange, m.
+/// Distance from the wrist's centre to the flange, m.
 const FLANGE: f64 = 0.085;
 
 /// Rotor inertia of the ERB 145 and ERB 115 modules at the motor, kg·m²: what motors of their size have.

@@ -22,7 +22,7 @@ const BRAKE_CREEP: f64 = 1e-6;
 /// A winding gear's damping as a share of the critical one of the motor on its spring.
 const GEAR_DAMPING: f64 = 0.1;
 
-/// The motor's side of a gear that gives way.
+/// The motor's side of an elastic gear.
 #[derive(Clone, Copy, Debug)]
 struct Motor {
     gear: Gear,
@@ -43,7 +43,7 @@ pub struct Simulation {
     motors: Vec<Option<Motor>>,
     states: Vec<State>,
     time: f64,
-    /// Steps until the bodies are looked at again.
+    /// Steps until the bodies are computed again.
     stale: u32,
     q: Vec<f64>,
     dq: Vec<f64>,

@@ -107,7 +107,7 @@ impl embedded_can::Frame for Frame {
     }
 }
 
-/// As `candump` and `cansend` write it: `185#4002F401`.
+/// The text of `candump` and `cansend`: `185#4002F401`.
 impl fmt::Display for Frame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:03X}#", self.id)?;

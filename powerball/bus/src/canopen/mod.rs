@@ -4,7 +4,7 @@
 //! slaves decode, and the other way round, so that each layout is written once. Nothing here keeps time or
 //! touches a bus.
 //!
-//! | module | what it is |
+//! | module | content |
 //! |---|---|
 //! | [`frame`] | one classic CAN frame with an 11-bit identifier |
 //! | [`cob`] | the predefined connection set: which identifier carries what, of which node |

@@ -23,7 +23,7 @@ impl Entry {
         (self.object.index as u32) << 16 | (self.object.sub as u32) << 8 | self.bits as u32
     }
 
-    /// From a mapping object's value.
+    /// An entry from a mapping object's value.
     pub const fn from_u32(raw: u32) -> Entry {
         Entry { object: Object::new((raw >> 16) as u16, (raw >> 8) as u8), bits: raw as u8 }
     }

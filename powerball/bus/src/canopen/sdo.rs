@@ -39,7 +39,7 @@ impl fmt::Debug for Chunk {
 pub enum Transfer {
     /// All of it, one to four bytes, in this frame. A frame that says no size counts as four.
     Expedited(Chunk),
-    /// In segments that follow, with the total number of bytes where it is given.
+    /// The value comes in segments that follow, with the total number of bytes if it is given.
     Segmented(Option<u32>),
 }
 

@@ -120,9 +120,8 @@ pub enum Cause {
     PositionLimit(NodeId, f64, f64),
     /// A joint's current stays at its limit: current and limit, A.
     TorqueLimit(NodeId, f64, f64),
-    /// In velocity mode a joint went this part of the travel that was asked for, less than half or more than
-    /// twice: the dimension factor 0x604C means something else than the profile says, or the joint is
-    /// blocked.
+    /// In velocity mode a joint moved this part of the commanded travel, less than half or more than twice:
+    /// the dimension factor 0x604C differs from that of the profile, or the joint is blocked.
     WrongVelocityScale(NodeId, f64),
     /// A joint moves faster than it may: its velocity and the greatest one, rad/s.
     Overspeed(JointNumber, f64, f64),

@@ -122,7 +122,7 @@ impl<const N: usize> Driver<N> {
             self.send_setpoints(tx);
         }
         if let Some(tick) = self.sync.poll(self.now) {
-            // What leaves now could be overtaken by SYNC and meet the next one in the same cycle.
+            // A frame that leaves now could be overtaken by SYNC and meet the next one in the same cycle.
             self.counters.dropped += u64::from(core::mem::take(&mut self.slot_open));
             self.judge_cycle(tick, tx);
             self.send(cob::SYNC, tx);
@@ -160,7 +160,7 @@ impl<const N: usize> Driver<N> {
             }
             joint.counters.missing += u64::from(judged);
             joint.missing_run = joint.missing_run.saturating_add(1);
-            // What is stopped already is reported once.
+            // An arm that is stopped already is reported once.
             let stopped = matches!(self.phase, Phase::Stopping | Phase::Faulted | Phase::Resetting);
             if judged && (joint.missing_run == limit || joint.missing_run > limit && !stopped) {
                 self.trip(Cause::DataMissing(self.node(j)), tx);
@@ -238,9 +238,9 @@ impl<const N: usize> Driver<N> {
         }
     }
 
-    /// In velocity mode the travel that was asked for is compared with the travel that was gone: a joint that is
-    /// slow to follow has no great velocity error. As long as the scale of velocities was not verified on
-    /// hardware, each move verifies it too: two readings of 0x604C are the inverse of each other.
+    /// Compares the commanded travel with the measured travel in velocity mode: a joint that is slow to
+    /// follow has no large velocity error. As long as the scale of velocities was not verified on hardware,
+    /// each move verifies it too: two readings of 0x604C are the inverse of each other.
     fn judge_travel(&mut self, tx: &mut impl Transmit) {
         if self.control != ControlMode::Velocity {
             return;

@@ -90,7 +90,7 @@ impl DataType {
 pub struct Entry {
     /// Where.
     pub object: Object,
-    /// What.
+    /// Data type of the object.
     pub data_type: DataType,
     /// Whether it can be read.
     pub readable: bool,

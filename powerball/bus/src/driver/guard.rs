@@ -147,7 +147,7 @@ mod tests {
 
     const FIRST: JointNumber = JointNumber::from_index(0);
 
-    /// Of a joint that rested at `last`.
+    /// The guard of a joint that rested at `last`.
     fn guard(mode: ControlMode, last: f64, position: f64) -> Guard<'static> {
         moving(mode, Box::leak(Box::new(Demand::at_rest(last))), position)
     }

@@ -1,4 +1,4 @@
-//! One joint while the driver runs: what its drive reports, and what it is commanded.
+//! One joint while the driver runs: reports of its drive, and its commands.
 //!
 //! The traits and events between driver and transport: [`Transmit`] and [`BusEvent`].
 
@@ -260,7 +260,7 @@ impl Joint {
     }
 }
 
-// What the driver requires of a transport, and what a transport reports to it.
+// Requirements of the driver on a transport, and reports of a transport to it.
 
 /// The transport's queue holds no more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -76,7 +76,7 @@ impl<const N: usize> Listener<N> {
         for ((joint, position), torque) in joints.iter().zip(&mut position).zip(&mut torque) {
             [*position, *torque] = (*joint)?;
         }
-        // What came before the first SYNC belongs to none.
+        // Data that came before the first SYNC belongs to none.
         Some(Heard { t: cycle? as f64 * self.profile.period_seconds(), position, torque })
     }
 

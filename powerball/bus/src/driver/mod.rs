@@ -137,7 +137,7 @@ impl Phase {
         Phase::Resetting,
     ];
 
-    /// In words, as in "the driver …".
+    /// The phase in words that continue "the driver …".
     pub const fn text(self) -> &'static str {
         match self {
             Phase::Idle => "is idle",
@@ -200,7 +200,7 @@ pub struct Counters {
 pub struct Note {
     /// When first.
     pub at: Micros,
-    /// What.
+    /// The cause of the note.
     pub cause: Cause,
     /// How often in a row.
     pub times: u32,
@@ -301,13 +301,14 @@ impl<const N: usize> Driver<N> {
         })
     }
 
-    /// From now on no set-point leaves for which the model of `guard` asks more torque of a joint than its profile allows.
+    /// From now on no set-point is sent that requires more torque of a joint than its profile allows, by the
+    /// model of `guard`.
     pub fn guard_torque(&mut self, guard: TorqueGuard<N>) {
         self.torque_guard = Some(guard);
     }
 
-    /// From the next [`Driver::start`] on, nodes whose device type (0x1000) or identity (0x1018) is another than the
-    /// profile says are used all the same, each deviation with a [`Note`]. Without the caller's word they are refused.
+    /// From the next [`Driver::start`] on, nodes with another device type (0x1000) or identity (0x1018) than
+    /// in the profile are used, each deviation with a [`Note`]. Without this call they are refused.
     pub fn accept_other_nodes(&mut self) {
         self.other_nodes = true;
     }

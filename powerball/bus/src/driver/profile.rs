@@ -141,7 +141,7 @@ pub struct Reactions {
     pub stop_timeout: Micros,
     /// For the brakes to close.
     pub brake_time: Micros,
-    /// After a fault reset, before the state is looked at.
+    /// After a fault reset, before the state is checked.
     pub fault_reset_time: Micros,
     /// Tries of the commutation search.
     pub commutation_tries: u8,
@@ -260,7 +260,7 @@ pub struct Profile<const N: usize> {
     pub bitrate: u32,
     /// Period of SYNC, µs. A multiple of 100, because 0x60C2 is written from it.
     pub sync_period: Micros,
-    /// The node id under which the master's heartbeat goes out.
+    /// The node id of the master's heartbeat.
     pub master: NodeId,
     /// Period of the master's heartbeat, µs.
     pub master_heartbeat: Micros,

@@ -273,7 +273,7 @@ impl<const N: usize> Driver<N> {
             Some(Cob::Heartbeat(node)) if node == master => Foreign::Heartbeat(node),
             _ => return false,
         };
-        // What is stopped already is reported once.
+        // An arm that is stopped already is reported once.
         let known = matches!(self.phase, Phase::Stopping | Phase::Faulted | Phase::Resetting)
             && matches!(self.cause, Some(Cause::OtherMaster(_)));
         if !known {

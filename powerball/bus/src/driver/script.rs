@@ -85,8 +85,8 @@ impl Pdo {
         Pdo { number, cob: Cob::Tpdo(number, node).id(), parameter: tpdo_parameter, mapping: tpdo_mapping }
     }
 
-    /// Switched off, mapped anew and switched on, in the order that CiA 301 requires; only switched off where
-    /// empty.
+    /// Switches a PDO off, maps it again and switches it on, in the order that CiA 301 requires; an empty one
+    /// is only switched off.
     fn configure(self, mapping: Mapping) -> impl Iterator<Item = Write> {
         let Pdo { number, cob, parameter, mapping: mapped } = self;
         let used = !mapping.is_empty();

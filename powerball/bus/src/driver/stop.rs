@@ -25,14 +25,14 @@ pub(super) enum ResetStage {
     Low,
     /// 0x0080.
     Edge,
-    /// 0x0000 again; after a while the state is looked at.
+    /// 0x0000 again; after a while the state is checked.
     Wait,
 }
 
 /// Cycles for which each word of a fault reset is sent.
 const WORD_CYCLES: Micros = 4;
 
-/// What is read from the drive that the cause is about.
+/// Objects that are read from the drive that caused the stop.
 const DIAGNOSIS: [Object; 4] =
     [ERROR_REGISTER, MANUFACTURER_STATUS, schunk::ERROR_DETAIL, schunk::ERROR_LINE];
 
@@ -222,7 +222,7 @@ impl<const N: usize> Driver<N> {
 
     fn end_stop(&mut self) {
         match self.cause {
-            // On request only: ready again where all is as it should be, and waited for where it is not.
+            // On request only: ready again if everything is in order, otherwise the driver waits for it.
             None => {
                 let whole =
                     self.joints.iter().all(|joint| joint.missing_run == 0) && self.unready().is_none();

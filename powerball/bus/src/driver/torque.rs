@@ -91,7 +91,7 @@ impl<const N: usize> fmt::Debug for TorqueGuard<N> {
     }
 }
 
-// What one joint was commanded last: the set-points that have left, newest first.
+// The last commands of one joint: the set-points that were sent, newest first.
 
 /// Number of set-points that are kept. A drive follows its interpolation points some cycles late: the joint
 /// is where one of the last of them was.
@@ -156,7 +156,8 @@ impl Demand {
     }
 }
 
-/// Where a joint at `position` (rad) with `velocity` (rad/s) comes to rest that brakes with `acceleration` (rad/s²).
+/// Position at which a joint comes to rest that is at `position` (rad) with `velocity` (rad/s) and brakes
+/// with `acceleration` (rad/s²).
 pub(super) fn rest(position: f64, velocity: f64, acceleration: f64) -> f64 {
     position + velocity * velocity.abs() / (2.0 * acceleration)
 }

@@ -22,8 +22,8 @@ use crate::canopen::Micros;
 use core::cmp::Ordering;
 use powerball_controller::JointNumber;
 
-/// Where the joints should be at the last SYNC, and how far they may be from there: by the gains of the law, what the model
-/// may be wrong by, and friction.
+/// Desired positions of the joints at the last SYNC, and their tolerance: by the gains of the law, the error
+/// of the model, and friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracking<const N: usize> {
     /// rad.

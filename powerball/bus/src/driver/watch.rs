@@ -16,7 +16,7 @@ const BEHIND: f64 = 0.2;
 pub(super) struct Watched {
     /// Last position and when it came.
     seen: Option<(f64, Micros)>,
-    /// Where the joint was when it was released, rad: one that stood outside its limits may be moved back.
+    /// Position of the joint when it was released, rad: a joint outside its limits may be moved back.
     released_at: f64,
     /// Cycles in a row beyond the following error, the velocity error, with an internal limit or without
     /// interpolation.
@@ -190,7 +190,7 @@ impl<const N: usize> Driver<N> {
         let (reactions, now, control) = (self.profile.reactions, self.now, self.control);
         let running = self.phase == Phase::Running;
         let (profile, joint) = (self.profile.joints.get(j)?, self.joints.get_mut(j)?);
-        // Where the caller asks for currents, the greatest is his to ask.
+        // A caller that commands currents may command the greatest one.
         let limit = joint.current_limit.unwrap_or(profile.current);
         let strained =
             control != ControlMode::Current && joint.current.abs() >= reactions.current_limit_part * limit;

@@ -300,7 +300,7 @@ const DISARM: Micros = 20_000;
 
 impl<B: Bus, const N: usize> Drop for Master<B, N> {
     fn drop(&mut self) {
-        // What cannot be done here is done by the drives, which watch.
+        // If this fails, the drives stop themselves, as they watch the master.
         if self.is_at_rest() || self.bring_to_rest().is_ok() {
             self.disarm_watch();
             #[cfg(unix)]

@@ -83,7 +83,7 @@ impl<P: Peer> Memory<P> {
         }
     }
 
-    /// What happens next, at most until `until`: a frame arrives, or the peer wakes.
+    /// Advances to the next event, at most until `until`: a frame arrives, or the peer wakes.
     fn step(&mut self, until: Micros) {
         while let Some(frame) = self.peer.transmit() {
             self.waiting.push(Waiting { frame, from_peer: true });

@@ -167,7 +167,7 @@ impl Clock {
         self.0.elapsed().as_micros() as Micros
     }
 
-    /// From now until a time of this clock.
+    /// Time from now until a time of this clock.
     fn left(&self, until: Micros) -> Duration {
         Duration::from_micros(until.saturating_sub(self.now()))
     }

@@ -4,7 +4,7 @@
 use crate::canopen::Frame;
 use serde::{Deserialize, Serialize};
 
-/// What python-can writes of a frame, in its order.
+/// The fields of a frame that python-can writes, in its order.
 #[derive(Serialize)]
 struct Sent<'a> {
     timestamp: f64,
@@ -25,7 +25,7 @@ fn as_bytes<S: serde::Serializer>(data: &[u8], to: S) -> Result<S::Ok, S::Error>
     to.serialize_bytes(data)
 }
 
-/// What is needed of it to make a frame.
+/// The fields that are needed to make a frame.
 #[derive(Deserialize)]
 struct Heard<'a> {
     arbitration_id: u16,

@@ -65,7 +65,7 @@ impl SocketCan {
     }
 }
 
-/// What an error frame with these class bits and data says that a driver must know.
+/// The event for a driver in an error frame with these class bits and data.
 fn event(class: u32, data: &[u8]) -> Option<Event> {
     let controller = |bits| class & CONTROLLER != 0 && data.get(1).is_some_and(|status| status & bits != 0);
     if class & BUS_OFF != 0 {

@@ -19,7 +19,7 @@ pub struct UdpMulticast {
     own_port: u16,
     /// Others than this machine may speak.
     open: bool,
-    /// The last sender that was looked at, and whether it is this machine.
+    /// The last sender that was checked, and whether it is this machine.
     sender: Option<(IpAddr, bool)>,
     clock: Clock,
 }
@@ -63,7 +63,8 @@ impl UdpMulticast {
             Some(Interface::Address(own)) => *own,
             _ => Ipv4Addr::UNSPECIFIED,
         };
-        // What is bound to a device speaks and hears there, whatever the routes say; 0 is any interface.
+        // A socket that is bound to a device sends and receives there, whatever the routes are; 0 is any
+        // interface.
         let index = match interface {
             Some(Interface::Name(name)) => bind_device(name, &[&listener, &speaker]).map_err(|e| {
                 BusError::Io(format!(

@@ -6,10 +6,10 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// Where a bus is.
+/// The address of a bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BusUrl {
-    /// In memory, with the built-in virtual arm on it.
+    /// A bus in memory, with the built-in virtual arm on it.
     Virtual,
     /// A CAN interface of Linux.
     SocketCan(String),
@@ -23,9 +23,9 @@ pub enum BusUrl {
 /// A network interface of this machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Interface {
-    /// By its own address.
+    /// An interface by its own address.
     Address(Ipv4Addr),
-    /// By its name; Linux.
+    /// An interface by its name; Linux only.
     Name(String),
 }
 

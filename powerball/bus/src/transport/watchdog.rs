@@ -10,7 +10,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What ends this process at SIGABRT: after all that has to be done before.
+/// The handler that ends this process at SIGABRT, after all other handlers.
 static END: Mutex<Option<SigId>> = Mutex::new(None);
 
 /// A second process that stops the arm where this one dies before the arm rests: SIGKILL, an abort, a stack overflow, no
@@ -30,7 +30,7 @@ impl Watchdog {
     /// # Errors
     /// Where it cannot be started, or ends at once.
     pub fn start(mut command: Command) -> io::Result<Watchdog> {
-        // In a group of its own: Ctrl-C is for this process, which stops the arm itself.
+        // The child has its own process group: Ctrl-C is for this process, which stops the arm itself.
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).process_group(0).spawn()?;
         let heard = child.stdout.take().map_or(Ok(0), |mut ready| ready.read(&mut [0]))?;
         if heard == 0 {

@@ -19,7 +19,7 @@ pub fn velocities(fastest: f64) -> Vec<f64> {
 pub struct Plateau {
     /// rad/s
     pub velocity: f64,
-    /// From the start of the motion, s.
+    /// Time from the start of the motion, s.
     pub from: f64,
     /// s
     pub to: f64,

@@ -40,7 +40,7 @@ pub enum Columns {
     /// `t`, `q1…qn` (rad) and `tau1…taun` (N·m).
     Torques,
     /// In addition, all that was sent and received: `ref1…refn`, the set-points (rad); `dq1…dqn`, as the
-    /// drives tell it (rad/s); `status1…statusn`, the statuswords; `answer1…answern`, from SYNC to the
+    /// drives report it (rad/s); `status1…statusn`, the statuswords; `answer1…answern`, from SYNC to the
     /// joint's data (s); and `late`, `skipped`, `dropped`, how many SYNCs and set-points were so since the
     /// recording began.
     Everything,

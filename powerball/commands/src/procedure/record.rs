@@ -312,14 +312,14 @@ pub fn way<const N: usize>(
     approach(from, to, &velocity, &acceleration, profile.period_seconds(), least)
 }
 
-/// Where a motion begins, if it is one of `N` joints.
+/// The first position of a motion, if it is one of `N` joints.
 fn beginning<const N: usize>(motion: &Motion) -> Option<[f64; N]> {
     motion.samples().next().and_then(|[q, ..]| q.try_into().ok())
 }
 
-/// The whole of it: brings the arm up, goes to where the motion begins at a quarter of its velocity, follows the
-/// motion, writes the log, and stops; `progress` hears how far it has come. The motion is looked at before anything
-/// is sent, the way to where it begins before the arm is enabled.
+/// The whole of it: brings the arm up, goes to where the motion begins at a quarter of its velocity, follows
+/// the motion, writes the log, and stops; `progress` hears how far it has come. The motion is checked before
+/// anything is sent, the way to where it begins before the arm is enabled.
 ///
 /// # Errors
 /// As [`Recorder::enable`] and [`Recorder::record`], and [`RecordError::Barred`]; the arm has not moved then.
@@ -432,7 +432,7 @@ mod tests {
                 .enumerate()
                 .all(|(k, row)| { row.len() == 40 && (row[0] - 10.0 - 0.005 * k as f64).abs() < 1e-9 })
         );
-        // What the drives say and when: their own velocities, "operation enabled", within the cycle.
+        // The drives' reports: their own velocities, "operation enabled", within the cycle.
         for (pair, sample) in rows.windows(3).zip(&motion.q.chunks(6).collect::<Vec<_>>()[1..]) {
             let row = &pair[1];
             assert!((0..6).all(|j| (row[13 + j] - sample[j]).abs() < 1e-6));

@@ -122,7 +122,7 @@ pub fn trend(cycles: &[Cycle]) -> Option<Trend> {
     Some(Trend { change: bound * span / mean_y.abs().max(f64::MIN_POSITIVE), cycles: count })
 }
 
-// From where an arm is to where a motion begins.
+// The path from an arm's position to the beginning of a motion.
 
 /// A motion from rest at `from` to rest at `to`, rad, every `period` s: all joints along 10x³ − 15x⁴ + 6x⁵,
 /// as slowly as the joint needs that has the farthest to go at `velocity` (rad/s) and `acceleration` (rad/s²),

@@ -266,8 +266,8 @@ mod tests {
         // One that is given no time is not called warm.
         let short = Settings { most: 20.0, ..settings };
         assert!(!warm_up(&mut recorder, &short, seen(), 0.0, &mut Vec::new(), |_, _| ()).unwrap().warm);
-        // What the log says is what was seen, but for a cycle that it holds in part; another swing's log is
-        // not taken.
+        // The log holds all earlier results, except for a partial cycle; the log of another swing is not
+        // used.
         let rows: Vec<Vec<f64>> =
             text.lines().skip(1).map(|l| l.split(',').map(|x| x.parse().unwrap()).collect()).collect();
         let whole = seen().earlier(&rows[..rows.len() - 300]).unwrap();

@@ -30,12 +30,12 @@ impl Axis {
         Axis { low, high, step: round_step((high - low) / ticks.max(1) as f64) }
     }
 
-    /// Where the axis starts.
+    /// The value at which the axis starts.
     pub(super) fn low(&self) -> f64 {
         self.low
     }
 
-    /// Where the axis ends.
+    /// The value at which the axis ends.
     pub(super) fn high(&self) -> f64 {
         self.high
     }

@@ -5,16 +5,16 @@ use nalgebra::{RealField, SMatrix, SVector};
 
 /// The size is held to zero as by this many usual samples without a change.
 const HELD: f64 = 10.0;
-/// What is usual is computed over this many samples …
+/// Number of samples over which the usual value is computed …
 const USUAL: f64 = 3000.0;
 /// … and is held to zero as by this many.
 const USUALLY: f64 = 1000.0;
-/// What a bet may lose at most of its capital.
+/// The largest share of its capital that a bet may lose.
 const MOST: f64 = 0.9;
 /// Capital beyond this is not counted: it fits into single precision, and the alarm is far below.
 const RICH: f64 = 1e25;
 
-/// What one joint contributes to a bet.
+/// The contribution of one joint to a bet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Term<T, const P: usize> {
     /// The joint's innovation.
@@ -72,8 +72,8 @@ impl<T: RealField + Copy, const P: usize> Bet<T, P> {
         self.learn(terms, &usual);
     }
 
-    /// By how much a beginning's capital is multiplied, and the capital with which one begins: what may be lost of it, as
-    /// a share of the most. Else all beginnings that wait with little put would add up.
+    /// The factor of a bet's capital, and the capital with which a new bet starts: the part of it that may be
+    /// lost, as a share of the largest one. Otherwise all bets that wait with little put on would add up.
     pub(super) fn factor(&self, terms: &[Term<T, P>], usual: &SVector<T, P>) -> (T, T) {
         let of = |x: f64| nalgebra::convert::<f64, T>(x);
         let size = self.size();

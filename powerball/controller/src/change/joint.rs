@@ -1,4 +1,4 @@
-//! What a joint shows that could not be predicted from its past.
+//! The innovation of a joint: the part of its residual that its past could not predict.
 
 use super::{FOLLOWED, GAIN, LEAST_MARGIN, ORDER, SLIP};
 use nalgebra::RealField;
@@ -50,7 +50,7 @@ impl<T: RealField + Copy> Whitener<T> {
     }
 }
 
-/// What one joint shows at one sample.
+/// The innovation of one joint at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Innovation<T> {
     /// z less the friction that was followed.
@@ -65,7 +65,7 @@ pub struct Innovation<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint<T> {
     colour: Colour<T>,
-    /// By how much of itself friction may wander.
+    /// Share of itself by which friction may wander.
     range: T,
     residual: Whitener<T>,
     friction: Whitener<T>,
@@ -100,7 +100,7 @@ impl<T: RealField + Copy> Joint<T> {
         let both =
             (self.residual.update(&self.colour, residual), self.friction.update(&self.colour, friction));
         let (Some(z), Some(f)) = both else {
-            // Where one of them has a gap the other has it too.
+            // If one of them has a gap, the other has it too.
             if !(residual.is_finite() && friction.is_finite()) {
                 self.interrupt();
             }

@@ -45,7 +45,7 @@ pub const GAIN: f64 = 8.0;
 pub const LEAST_MARGIN: f64 = 0.02;
 /// Friction is followed over this many samples.
 pub const FOLLOWED: f64 = 500.0;
-/// By what share of its range friction may be ahead of what was followed.
+/// Share of its range by which friction may be ahead of the followed value.
 pub const SLIP: f64 = 0.1;
 /// The size of a change is computed over this many samples.
 pub const WINDOW: f64 = 25.0;

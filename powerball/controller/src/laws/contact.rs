@@ -94,7 +94,7 @@ mod tests {
         ContactDetector::new([law; 3], Vector3::new(0.2, 0.2, 0.1))
     }
 
-    /// By hand: at 1 rad/s f = 3.5, so that 0.2 + 0.35 + 0.02·10 = 0.75 N·m is the level of joint 1.
+    /// Computed by hand: at 1 rad/s f = 3.5, so that 0.2 + 0.35 + 0.02·10 = 0.75 N·m is the level of joint 1.
     #[test]
     fn the_level_goes_with_the_motion() {
         let (fast, rigid) = (Vector3::repeat(1.0), Vector3::repeat(10.0));

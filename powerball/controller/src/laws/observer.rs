@@ -108,7 +108,7 @@ mod tests {
         let arm = Planar::<4>::default();
         let q = Vector4::new(0.5, 0.9, -0.7, 0.6);
         let j = arm.jacobian(&q);
-        // What a planar arm can feel.
+        // A wrench that a planar arm can feel.
         let force = Vector6::new(12.0, -7.0, 0.0, 0.0, 0.0, 1.5);
         let found = tool_force(&j, &(j.transpose() * force), 1e-9).unwrap();
         assert!((found - force).norm() < 1e-4, "{found}");

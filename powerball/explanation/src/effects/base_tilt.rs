@@ -35,7 +35,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// In words.
+    /// The figures in words.
     #[must_use]
     pub(super) fn in_words(&self, _: &Words<'_>) -> String {
         format!("{} rad about x, {} rad about y", number(self.tilt[0]), number(self.tilt[1]))

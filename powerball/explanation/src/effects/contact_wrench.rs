@@ -67,7 +67,7 @@ impl Point {
 const EACH: usize = 3;
 
 impl Figures {
-    /// In words.
+    /// The figures in words.
     #[must_use]
     pub(super) fn in_words(&self, _: &Words<'_>) -> String {
         let size = |force: &Vec<f64>| force.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -358,7 +358,7 @@ fn mean(candidate: &Candidate, c: &[f64]) -> Vec<f64> {
     (0..3).map(|axis| (0..knots).map(|k| share(k) * c[3 * k + axis]).sum()).collect()
 }
 
-/// Where a log's longer windows lie.
+/// The range of a log's longer windows.
 fn inner(log: &Range<usize>) -> Range<usize> {
     let clear = log.len().div_ceil(CLEAR);
     log.start + clear..log.end.saturating_sub(clear).max(log.start + clear)

@@ -23,7 +23,7 @@ pub enum Class {
 }
 
 impl Class {
-    /// In words.
+    /// The class in words.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -43,7 +43,7 @@ pub type Placed = (JointNumber, Law<f64>, f64);
 pub enum Part {
     /// Torques: its laws with their coefficients (see [`Effect::placed_laws`]).
     Laws,
-    /// A rigid arm with another value of a parameter that was taken for zero.
+    /// A rigid arm with another value of a parameter that was assumed zero.
     Parameter(Parameter, f64),
     /// A rigid arm under another gravity, m/s² in the base frame, and what all its parameters gain by what
     /// that shows; empty for nothing.
@@ -63,7 +63,7 @@ pub enum Part {
 /// A candidate that is given to an effect is one of its own; for another effect's candidate it gives nothing
 /// (no columns, no laws, nothing near it).
 pub trait Effect: Sync {
-    // What it is.
+    // Properties of the effect.
 
     /// The effect's name in results.
     fn name(&self) -> &'static str;
@@ -124,8 +124,9 @@ pub trait Effect: Sync {
 
     // How it is looked for.
 
-    /// What is in the model from the start, so that no other effect is judged without it: what every
-    /// arm may have, as the zero of a torque sensor. It is named at the end, where it is needed.
+    /// Candidates that are in the model from the start, so that no other effect is judged without them:
+    /// effects that every arm may have, such as the zero of a torque sensor. They get a name at the end, if
+    /// they are needed.
     fn baseline(&self, _context: &Context<'_>) -> Vec<Candidate> {
         Vec::new()
     }
@@ -178,7 +179,7 @@ pub trait Effect: Sync {
         None
     }
 
-    // What is reported about it once it is accepted.
+    // The report on an accepted effect.
 
     /// The windows of the effect in the context's logs, and those in which it continues in logs that were not
     /// fitted.
@@ -186,8 +187,8 @@ pub trait Effect: Sync {
         candidate.windows.clone()
     }
 
-    /// What logs that were not fitted say themselves of an accepted candidate that may be in some logs and
-    /// not in others; `context` holds their residual without it.
+    /// The evidence of logs that were not fitted for an accepted candidate that may be in some logs and not
+    /// in others; `context` holds their residual without it.
     fn seen_in(
         &self,
         _context: &Context<'_>,
@@ -197,7 +198,7 @@ pub trait Effect: Sync {
         None
     }
 
-    /// What an accepted candidate is in a model of the arm.
+    /// The form of an accepted candidate in a model of the arm.
     fn part(&self, _context: &Context<'_>, _candidate: &Candidate, _coefficients: &[f64]) -> Part {
         Part::Laws
     }

@@ -33,7 +33,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// In words.
+    /// The figures in words.
     #[must_use]
     pub(super) fn in_words(&self, words: &Words<'_>) -> String {
         // Of a joint that slides the order counts on 2π m.

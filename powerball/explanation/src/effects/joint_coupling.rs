@@ -31,11 +31,11 @@ pub struct Settings {
 pub enum Kind {
     /// Coupling by cross-joint Coulomb friction.
     Coulomb,
-    /// In proportion to its velocity.
+    /// Coupling in proportion to its velocity.
     Viscous,
-    /// In proportion to its acceleration.
+    /// Coupling in proportion to its acceleration.
     Inertial,
-    /// As its whole friction, with levels of its own.
+    /// Coupling by its whole friction, with levels of its own.
     Friction {
         /// γ₂ and γ₄ of the joint, where their levels are not zero, s/rad.
         steepness: Vec<f64>,
@@ -94,7 +94,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// In words.
+    /// The figures in words.
     #[must_use]
     pub(super) fn in_words(&self, _: &Words<'_>) -> String {
         let one = |((law, from), c): ((&&str, &JointNumber), &f64)| {

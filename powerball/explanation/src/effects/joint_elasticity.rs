@@ -25,7 +25,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// In words.
+    /// The figures in words.
     #[must_use]
     pub(super) fn in_words(&self, words: &Words<'_>) -> String {
         format!("{} {}/{}", words.sizes(&self.stiffness.0, 1.0), words.torque(), words.position())

@@ -20,7 +20,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// In words.
+    /// The figures in words.
     #[must_use]
     pub(super) fn in_words(&self, words: &Words<'_>) -> String {
         let unit = words.torque();

@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Largest memory for columns of laws of the motion, bytes. Further columns are computed each time.
 const MOST: usize = 96 << 20;
-/// What is kept at most of one model, bytes.
+/// Largest memory for columns of one model, bytes.
 const MOST_OF_MODEL: usize = 32 << 20;
 /// Models of which something is kept: the one that is searched with, the one before it, and those that are
 /// tried next to it.

@@ -65,7 +65,7 @@ macro_rules! library {
         }
 
         impl Figures {
-            /// In words, with units.
+            /// The figures in words, with units.
             #[must_use]
             pub fn in_words(&self, words: &words::Words<'_>) -> String {
                 match self {

@@ -55,12 +55,12 @@ pub struct Figures {
     /// Mass of the body, kg; nothing where only its first moment shows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mass: Option<f64>,
-    /// From when on, one for each log that has it, in the log's own t, s.
+    /// Start times, one for each log that has the body, in the log's own t, s.
     pub start_time: Vec<f64>,
 }
 
 impl Figures {
-    /// In words.
+    /// The figures in words.
     #[must_use]
     pub(super) fn in_words(&self, _: &Words<'_>) -> String {
         let vector = |x: &[f64; 3]| format!("({})", x.map(number).join(", "));
@@ -94,7 +94,7 @@ const SHORTEST: usize = 16;
 const LEAST: usize = 4;
 /// Parts of a log at which it is picked up and put down are looked for first.
 const COARSE: usize = 24;
-/// What an end within a log must explain beyond the same run to the log's end, in units of χ².
+/// Least gain of an end within a log over the same run to the log's end, in units of χ².
 const END: f64 = 10.0;
 /// A centre of mass farther than this from the flange, m, is no payload.
 const REACH: f64 = 1.0;
@@ -359,7 +359,7 @@ impl Search {
         Search { before, found: empty, coefficients: Vec::new(), explained: 0.0, searched: 0.0, positive }
     }
 
-    /// What was found and a run of steps, summed.
+    /// The sums of the candidate found and of a run of steps.
     fn with(&self, run: &Range<usize>) -> Sums {
         let mut sum = self.found.clone();
         sum.add(&self.before[run.end]);
@@ -367,7 +367,7 @@ impl Search {
         sum
     }
 
-    /// What that explains where it can be a body.
+    /// The gain of that, if it can be a body.
     fn gain(&mut self, run: &Range<usize>) -> f64 {
         self.searched += 1.0;
         let (gain, x) = self.with(run).gain();

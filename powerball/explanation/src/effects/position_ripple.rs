@@ -36,7 +36,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// In words.
+    /// The figures in words.
     #[must_use]
     pub(super) fn in_words(&self, words: &Words<'_>) -> String {
         // Of a joint that slides the order counts on 2π m.
@@ -58,7 +58,7 @@ const SMALL_ORDERS: usize = 20;
 pub(crate) const BINS: usize = 2048;
 /// Two ripples of a joint whose orders differ by less than this are one.
 const SAME_ORDER: f64 = 0.5;
-/// Peaks of the scan that are looked at closely.
+/// Peaks of the scan that are examined closely.
 const PEAKS: usize = 4;
 
 impl Effect for PositionRipple {

@@ -26,7 +26,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// In words.
+    /// The figures in words.
     #[must_use]
     pub(super) fn in_words(&self, words: &Words<'_>) -> String {
         let (torque, position) = (words.torque(), words.position());

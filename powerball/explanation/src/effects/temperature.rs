@@ -32,12 +32,12 @@ pub enum Friction {
 /// The quantity with which friction changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Warmth {
-    /// With the running time.
+    /// Friction changes with the running time.
     RunningTime {
         /// T, s.
         time_constant: f64,
     },
-    /// With the logged temperature.
+    /// Friction changes with the logged temperature.
     Logged {
         /// ϑ₀: the temperature at the start of the logs, °C.
         reference: f64,
@@ -47,14 +47,14 @@ pub enum Warmth {
 /// Figures of this effect in a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
-    /// From cold to warm (or over 10 K), as a share of what the friction was when cold.
+    /// Change from cold to warm (or over 10 K), as a share of the cold friction.
     pub change: ByJoint,
     /// T, s; 0 where the change follows a logged temperature.
     pub time_constant: ByJoint,
 }
 
 impl Figures {
-    /// In words.
+    /// The figures in words.
     #[must_use]
     pub(super) fn in_words(&self, words: &Words<'_>) -> String {
         let one = |(k, (change, time)): (usize, (&f64, &f64))| {

@@ -23,12 +23,12 @@ pub struct Settings {
 /// Figures of this effect in a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figures {
-    /// By how much the logged torque is late, s.
+    /// Delay of the logged torque, s.
     pub delay: ByJoint,
 }
 
 impl Figures {
-    /// In words.
+    /// The figures in words.
     #[must_use]
     pub(super) fn in_words(&self, words: &Words<'_>) -> String {
         format!("{} ms", words.sizes(&self.delay.0, 1e3))

@@ -42,7 +42,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// In words.
+    /// The figures in words.
     #[must_use]
     pub(super) fn in_words(&self, words: &Words<'_>) -> String {
         let one = |k: usize| {

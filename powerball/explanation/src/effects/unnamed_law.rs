@@ -58,7 +58,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// In words.
+    /// The figures in words.
     #[must_use]
     pub(super) fn in_words(&self, _: &Words<'_>) -> String {
         self.formulas.iter().map(|f| f.formula.clone()).collect::<Vec<_>>().join("; ")

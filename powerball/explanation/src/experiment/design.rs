@@ -145,7 +145,7 @@ fn left(gram: &Mat<f64>, right: &[f64], square: f64, free: &[bool]) -> (f64, Vec
     (square - dot(&x, right), x)
 }
 
-/// What a path would show.
+/// The evidence that a path would give.
 #[derive(Clone, Debug)]
 struct Shows {
     /// χ² that the new log would add.
@@ -158,7 +158,8 @@ struct Shows {
     by_joint: Vec<f64>,
 }
 
-/// What a path shows of the pair of names that is hardest to tell apart; `None` where the path moves nothing.
+/// The evidence of a path for the pair of names that is hardest to distinguish; `None` if the path moves
+/// nothing.
 fn judge(
     body: &RigidArm,
     open: &Open,
@@ -226,7 +227,7 @@ fn judge(
         .min_by(|a, b| a.evidence.total_cmp(&b.evidence))
 }
 
-/// A motion as a log. Its torques are never looked at, but one that never changes would count as dead:
+/// A motion as a log. Its torques are never used, but one that never changes would count as dead:
 /// positions stand in.
 fn log_of(motion: &Motion) -> Log {
     let n = motion.dof();

@@ -143,7 +143,7 @@ fn raises_error(study: &Study<'_>, model: &Model, ripple: &Ripple) -> bool {
     residual.squares()[joint] > before
 }
 
-// What a model leaves of a joint's torque above the band of the fit: along each recording, by order of the joint's
+// The residual of a joint's torque above the band of the fit: along each recording, by order of the joint's
 // position, and as one ripple.
 
 /// A joint along one recording, while it moves.
@@ -264,7 +264,7 @@ impl Velocities {
 
 /// Orders whose median is what noise leaves there, in cycles a turn.
 const AROUND: f64 = 64.0;
-/// An order is looked at where this share of a joint's samples passes it above the band.
+/// An order is examined if this share of a joint's samples passes it above the band.
 const LEAST_SHARE: f64 = 0.1;
 /// Orders above this share of those that bins can hold are weakened by the bins.
 const HIGHEST: f64 = 0.8 * BINS as f64 / 2.0;
@@ -393,7 +393,8 @@ fn products(traces: &[Trace], order: f64) -> [f64; 2] {
     [cosine, sine]
 }
 
-/// What noise gives of |Σ τ·e^(−i·k·q)|² in a sample that passes above the band, at orders around one.
+/// The contribution of noise to |Σ τ·e^(−i·k·q)|² in a sample that passes above the band, at orders around
+/// one.
 fn noise_around(traces: &[Trace], order: f64) -> f64 {
     let velocities = Velocities::of(traces);
     let near = (0..2 * NEIGHBOURS).map(|k| {

@@ -22,7 +22,8 @@ pub(crate) struct Changed {
     /// The name of the effect that it would be if it were in all logs.
     pub(crate) effect: &'static str,
     pub(crate) joints: Vec<JointNumber>,
-    /// By how much: of friction relative, of a zero N·m (N) or rad (m), of a gain relative, of a delay s.
+    /// Size of the difference: of friction and of a gain relative, of a zero in N·m (N) or rad (m), of a
+    /// delay in s.
     pub(crate) value: f64,
     /// The share of what the squared error of its joints is larger in this log than in others that goes with it.
     pub(crate) share: f64,
@@ -32,14 +33,14 @@ pub(crate) struct Changed {
 struct Tried {
     effect: &'static str,
     joints: Vec<JointNumber>,
-    /// By which its coefficient is multiplied to be a figure.
+    /// Factor from its coefficient to a figure.
     unit: f64,
     /// Coefficients that are possible.
     possible: Range<f64>,
     columns: [Column; SIDES],
 }
 
-/// At most this many are looked for in a log, all logs together.
+/// Largest number of differences that are searched in a log, all logs together.
 const MOST_A_LOG: usize = 3;
 /// With this many other logs, a coefficient must be this many times as far from theirs as they are spread.
 const OTHERS: usize = 3;
@@ -99,7 +100,7 @@ pub(crate) fn changes(
     (found.into_iter().map(|(_, changed)| changed).collect(), together.residual)
 }
 
-/// What is tried of every log.
+/// The differences that are tried for every log.
 fn tried(study: &Study<'_>, model: &Model) -> Vec<Tried> {
     let (on_fitted, on_validation) = (model.context(study), study.on_validation(&model.fit, &[]));
     let mut tried = Vec::new();

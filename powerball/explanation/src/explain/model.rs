@@ -23,7 +23,7 @@ pub(super) struct Accepted {
 /// How an effect came into the model, and with how many columns of the fit.
 #[derive(Clone, Debug)]
 pub(super) enum Origin {
-    /// It is in the model from the start (see [`Effect::baseline`]).
+    /// The effect is in the model from the start (see [`Effect::baseline`]).
     Baseline { columns: usize },
     /// A step accepted it.
     Step { number: usize, columns: usize },
@@ -242,7 +242,7 @@ impl Model {
         }
     }
 
-    /// What the validation logs say themselves of an effect that is in some logs and not in others.
+    /// The evidence of the validation logs for an effect that is in some logs and not in others.
     fn seen_in_validation(&self, study: &Study<'_>, k: usize) -> Option<Candidate> {
         let a = &self.accepted[k];
         if a.candidate.windows.is_empty() {

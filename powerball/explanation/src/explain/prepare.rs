@@ -155,6 +155,6 @@ fn is_plainly_better(model: &Model, other: &Model, study: &Study<'_>) -> bool {
     let moving: Vec<usize> = (0..study.data.dof()).filter(|j| theirs[*j] > 0.0).collect();
     let least = 1.0 - study.rule().large_gain;
     let better = |j: &&usize| ours[**j] < least * theirs[**j] && back[**j] < least * their_back[**j];
-    // One joint alone is looked at like any other effect.
+    // One joint alone is treated like any other effect.
     moving.iter().filter(better).count() >= study.rule().joints_with_zeros.min(moving.len()).max(1)
 }

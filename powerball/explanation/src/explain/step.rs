@@ -108,7 +108,7 @@ fn most_promising(groups: &mut [Group], tester: &Tester<'_>) -> Option<usize> {
     best.map(|(g, _)| g)
 }
 
-/// What needs fewer columns and is as good is preferred.
+/// Prefers an equally good group that needs fewer columns.
 fn simplest_as_good(groups: &mut [Group], best: usize, tester: &Tester<'_>) -> usize {
     let rule = tester.study.rule();
     let top = groups[best].potential();
@@ -127,7 +127,7 @@ fn simplest_as_good(groups: &mut [Group], best: usize, tester: &Tester<'_>) -> u
     chosen
 }
 
-/// Of every group of which nothing passes, why its best member does not.
+/// The reason why the best member does not pass, for every group without a passing member.
 fn refused(groups: &[Group]) -> Vec<Rival> {
     let nothing = groups.iter().filter(|g| g.potential() == 0.0);
     let why = |g: &Group| {
@@ -180,7 +180,7 @@ pub(super) fn accept(study: &Study<'_>, model: &mut Model, choice: Choice, numbe
     if !effect.has_name() {
         drop_words_for(study, model, number);
     }
-    // What does not last is not tried again: it would be accepted and taken out for ever.
+    // An effect that does not last is not tried again: it would be accepted and removed for ever.
     let gone = added.into_iter().filter(|candidate| !model.has(candidate)).collect::<Vec<_>>();
     model.given_up.extend(gone);
     let after = residual_stats(&study.validation, &model.residual_on_validation(study)).rms;
@@ -263,7 +263,8 @@ fn name_baseline(study: &Study<'_>, model: &mut Model, effect: &'static dyn Effe
     let screen = Screen::new(&context);
     let (mut groups, _) = groups(study, model, &screen, CandidateKind::Names);
     groups.retain(|g| g.effect != effect);
-    // What has it as a part and explains no more is no rival: a spring at rest elsewhere has the zero in it.
+    // An effect that contains it and explains no more is not a rival: a spring at rest elsewhere contains the
+    // zero.
     let own: Vec<Vec<Placed>> =
         which.iter().flat_map(|k| effect.placed_laws(&context, &fitted[*k].candidate)).collect();
     let holds =

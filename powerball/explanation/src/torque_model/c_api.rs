@@ -4,7 +4,7 @@ use dyngen::Function;
 use dyngen::emit::c_api::{self, CApi, CArray, CFunction};
 use powerball_controller::correction::{Memory, Term};
 
-/// What the API is to.
+/// The functions that the API calls.
 pub(super) struct Behind<'a> {
     /// The arm's name.
     pub arm: &'a str,

@@ -39,7 +39,7 @@ pub struct JointColour {
     pub coefficients: [f64; ORDER],
     /// Standard deviation of e, N·m.
     pub deviation: f64,
-    /// By how many of these the mean of e differs from zero without a change.
+    /// Number of these by which the mean of e differs from zero without a change.
     pub margin: f64,
 }
 
@@ -126,7 +126,7 @@ impl Colour {
             let scale = |own: &JointColour| own.with(own.margin * by);
             joints.iter().map(|own| own.as_ref().map(scale)).collect()
         };
-        // Where each is calm but not what they say together; where no such margin helps each keeps its own.
+        // For joints that are calm alone but not together; if no such margin helps, each keeps its own.
         let by = least(1.0, TOGETHER, |by| is_calm(&scaled(by))).unwrap_or(1.0);
         let joints = scaled(by);
         joints.iter().any(Option::is_some).then_some(Colour { rate, joints })

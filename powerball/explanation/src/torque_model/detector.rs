@@ -113,7 +113,7 @@ impl Detector {
     }
 }
 
-/// What a joint says at one row.
+/// The innovation of a joint at one row.
 #[derive(Debug)]
 struct Says {
     innovation: Innovation<f64>,
@@ -148,7 +148,7 @@ fn columns<const P: usize>(says: &Says, from: usize) -> [f64; P] {
     std::array::from_fn(|k| says.columns.get(from + k).copied().unwrap_or(0.0))
 }
 
-/// What joints say to a bet on which they show.
+/// The contributions to a bet of the joints on which it shows.
 fn terms<const P: usize>(
     says: &[(usize, Says)],
     columns: impl Fn(usize, &Says) -> Option<[f64; P]>,

@@ -174,7 +174,7 @@ mod from_one {
     }
 }
 
-/// As [`from_one`], for two joints.
+/// Like [`from_one`], for two joints.
 mod pair_from_one {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 

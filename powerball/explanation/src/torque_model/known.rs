@@ -30,7 +30,7 @@ impl TorqueModel {
         }
     }
 
-    /// As [`Self::take_out`], for logs of motors.
+    /// Like [`Self::take_out`], for logs of motors.
     fn take_out_of(&self, body: &RigidArm, logs: &mut [Log]) {
         self.additions.log_changes.clean(logs);
         if self.additions.terms.is_empty() {

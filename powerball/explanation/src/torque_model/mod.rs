@@ -101,7 +101,7 @@ pub struct ArmChanges {
 pub struct LogChanges {
     /// Logged less true position, rad.
     pub encoder_offset: Vec<f64>,
-    /// By how much logged torques are late, s.
+    /// Delay of the logged torques, s.
     pub delay: Vec<f64>,
 }
 
@@ -117,7 +117,7 @@ pub struct Payload {
     pub link: Option<JointNumber>,
     /// The logs it is in.
     pub logs: Vec<String>,
-    /// From when on, in each log's own t, s.
+    /// Start times, in each log's own t, s.
     pub start_time: Vec<f64>,
     /// Until when, in each log's own t, s: null where it stays to the end; nothing where it does in all.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -142,7 +142,7 @@ impl LogChanges {
         self.encoder_offset.get(joint).copied().unwrap_or(0.0)
     }
 
-    /// By how much a joint's torque is late, s.
+    /// Delay of a joint's torque, s.
     #[must_use]
     pub fn late(&self, joint: usize) -> f64 {
         self.delay.get(joint).copied().unwrap_or(0.0)
@@ -243,7 +243,7 @@ impl TorqueModel {
         for _ in 0..passes {
             let mut motion = motors.clone();
             for term in &moving {
-                // Only what gives way does so under the load that it has there; play has a side.
+                // Only an elastic part deflects under the load that it has there; play has a side.
                 let load = if term.law == Law::Compliance { &rigid } else { &at_motors };
                 move_link(&mut motion, recording, load, term.joint, term.law, (term.coefficient, SOFT));
             }

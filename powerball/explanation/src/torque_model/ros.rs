@@ -72,7 +72,7 @@ impl TorqueModel {
                 ("gamma4", g4),
                 ("gamma5", g5),
                 ("constant", constant),
-                // What simpler laws ask for: far from standstill, and by velocity.
+                // Parameters of simpler laws: far from standstill, and by velocity.
                 ("coulomb", g1 + g3),
                 ("viscous", g5),
             ] {

@@ -16,7 +16,7 @@ pub const BAND: f64 = 20.0;
 const ENDS: f64 = 0.16;
 /// A slower joint rests, rad/s or m/s: what is left there is how it sticks.
 const REST: f64 = motion::REST_SPEED;
-/// By how much a joint's zero is moved for its column, rad.
+/// Step of a joint's zero for its column, rad.
 const MOVED: f64 = 1e-3;
 
 /// Columns of a body in the hand (mass and first moments), of a force at the tool, and of a delay; those of the joints'

@@ -45,7 +45,7 @@ pub enum SourceError {
     /// The model's changes are another arm's.
     #[error("{0}")]
     Changes(Unchanged),
-    /// What cannot be proven is not emitted.
+    /// The generator failed: code that cannot be proven is not emitted.
     #[error("{0}")]
     Generator(dyngen::Error),
     /// No name in C can begin so.
@@ -54,7 +54,7 @@ pub enum SourceError {
 }
 
 impl TorqueModel {
-    /// What a controller cannot make up for, in words.
+    /// Effects that a controller cannot compensate, a sentence each.
     #[must_use]
     pub fn not_compensated(&self) -> Vec<String> {
         let mut notes = Vec::new();
@@ -124,7 +124,7 @@ impl TorqueModel {
         Ok(text)
     }
 
-    /// As [`Self::source`], with `extern "C"` functions whose names begin with `prefix`, and a header for
+    /// Like [`Self::source`], with `extern "C"` functions whose names begin with `prefix`, and a header for
     /// them.
     ///
     /// The model is the caller's own memory, so there is no allocation; no pointer is kept.

@@ -16,7 +16,7 @@ pub(super) enum Change {
     Force { force: [f64; 3], link: JointNumber },
     /// Logged less true position, rad.
     Offset { joint: JointNumber, by: f64 },
-    /// By how much torques are later, s.
+    /// Additional delay of torques, s.
     Delay { joints: Vec<JointNumber>, by: f64 },
 }
 

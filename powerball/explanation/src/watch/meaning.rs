@@ -24,7 +24,7 @@ const LATEST: f64 = 5.0;
 /// A change of another size by less than this share of it is the same one, better known.
 const SAME: f64 = 0.35;
 
-/// What the rows since an alarm say.
+/// The findings from the rows since an alarm.
 #[derive(Debug, Default)]
 struct Found {
     named: Option<Named>,
@@ -90,7 +90,7 @@ impl Stream<'_> {
         Some(Found { named: known.then(|| best.clone()), over: None, explains: best.explains, left, rivals })
     }
 
-    /// What the model leaves with some changes.
+    /// The residual of the model with some changes.
     fn residual(&self, data: &Data<'_>, changes: &[Change]) -> Signals {
         let torque = |recording| changes::torque(self.setting.body, self.setting.model, changes, recording);
         data.residual(&data.recordings.iter().map(torque).collect::<Vec<_>>())
@@ -144,7 +144,7 @@ impl Stream<'_> {
             return Some(event(change.name(), Vec::new(), Map::new(), pending.since));
         }
         let Some(named) = found.named else {
-            // What has no name is taken as good from now on.
+            // A change without a name is taken as good from now on.
             self.learn_again([pending.joint]);
             return Some(event("unknown", Vec::new(), Map::new(), pending.since));
         };

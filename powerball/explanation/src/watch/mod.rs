@@ -28,7 +28,7 @@ pub const FIRST: usize = 40;
 pub struct WatchOptions {
     /// The mean time to a false alarm, h of motion.
     pub hours: f64,
-    /// By how much of itself each joint's friction may wander.
+    /// Share of itself by which each joint's friction may wander.
     pub friction_range: f64,
     /// Time whose motion is taken as good if the model file has no colour, s.
     pub learn: f64,
@@ -50,7 +50,7 @@ impl WatchOptions {
     }
 }
 
-/// What a stream is watched with.
+/// The model and the options of a watch.
 #[derive(Clone, Copy, Debug)]
 struct Setting<'a> {
     body: &'a RigidArm,

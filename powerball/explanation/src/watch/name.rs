@@ -32,13 +32,14 @@ const FURTHER: f64 = 30.0;
 const BLURRED: [f64; 2] = [0.15, 0.3];
 /// χ² of such a row, which noise does not reach.
 const ANYTHING: f64 = 16.0;
-/// They hold at most this many times what the others do: a step through the colour is largest where it is.
+/// These rows count at most this many times as much as the others: a step through the colour is largest
+/// there.
 const EDGES: f64 = 4.0;
 /// A force elsewhere than on the tool counts as this many alternatives for each link.
 const ELSEWHERE: f64 = 20.0;
 /// Innovations of a block.
 const BLOCK: usize = 12;
-/// A heavier body pulls more than any push that is taken for one, kg.
+/// A heavier body pulls more than any push that could be mistaken for one, kg.
 const HEAVIEST: f64 = 200.0;
 /// A joint shows a change where that explains this much of its χ².
 const SHOWS: f64 = 15.0;
@@ -278,7 +279,7 @@ impl<'a> Stretch<'a> {
         names
     }
 
-    /// Where a change of such columns begins: what explains most near the first guess.
+    /// The start of a change of such columns: that which explains most near the first guess.
     fn beginning(&self, columns: &[Column], guess: Guess) -> f64 {
         best_time(guess, |from| self.fitted(&self.cut(columns, from, f64::INFINITY), &[]).1)
     }

@@ -12,8 +12,7 @@ use powerball_logs::regression::{DataOptions, Recording};
 const HOP: f64 = 0.05;
 /// Time before new rows that is needed, s: filters and presliding have memories.
 const BEFORE: f64 = 2.5;
-/// What is learnt again, of a model with a change whose size is known roughly, has this many times the
-/// margin.
+/// Factor of the margin after learning again, for a model with a change whose size is known only roughly.
 const AGAIN: f64 = 1.5;
 
 /// An alarm that has no name yet.
@@ -217,7 +216,7 @@ impl<'a> Stream<'a> {
     }
 }
 
-/// What is to be reported before the first sample.
+/// Notes before the first sample.
 fn beginning(setting: Setting<'_>, known: Option<&Colour>, rate: f64) -> Vec<String> {
     let (file, learn) = (setting.file, setting.options.learn);
     match (known, &setting.model.colour) {

@@ -44,12 +44,12 @@ fn payload(joints: usize, found: &Differences) -> Option<Cause> {
     load.is_enough(found).then(|| load.cause())
 }
 
-/// What a body on a link explains of the inertial difference.
+/// The part of the inertial difference that a body on a link explains.
 struct Load {
     link: usize,
     /// Whether it is the last one.
     last: bool,
-    /// By parameter of a body: its value and its variance, where the logs tell it.
+    /// By parameter of a body: its value and its variance, if the logs determine it.
     values: Vec<Option<[f64; 2]>>,
     /// χ² of the difference, and what of it is left.
     all: f64,

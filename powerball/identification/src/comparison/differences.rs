@@ -193,7 +193,7 @@ fn parameters(a: &Side, b: &Side, place: &[usize]) -> Vec<(usize, usize, Differe
     place.iter().enumerate().filter_map(one).collect()
 }
 
-/// What the difference is in torque along the logs of `a`; nothing where these are not known.
+/// The difference in torque along the logs of `a`; empty if these are not known.
 fn torque(a: &Side, b: &Side, place: &[usize]) -> Vec<TorqueDifference> {
     let Some(all) = &a.uncertainty else { return Vec::new() };
     let mut change = vec![0.0; all.freedom.len()];
@@ -316,7 +316,7 @@ impl Difference {
     }
 }
 
-// What varies from run to run: no residual's spread has it, and two parts of one log tell it.
+// Variation from run to run: it is not in the spread of a residual, but two parts of one log show it.
 
 impl Side {
     /// This side with enlarged errors, so that fits of two parts of its logs, which are of one arm, differ by

@@ -5,7 +5,7 @@ use serde::Serialize;
 /// All settings of [`compare`](super::compare).
 #[derive(Clone, Debug)]
 pub struct CompareOptions {
-    /// In which share of comparisons equal arms may be called different.
+    /// Share of comparisons in which equal arms may be called different.
     pub level: f64,
 }
 
@@ -27,7 +27,7 @@ pub struct Comparison {
     pub arm: String,
     /// Whether they differ beyond what their errors explain.
     pub differ: bool,
-    /// In which share of comparisons equal arms are called different.
+    /// Share of comparisons in which equal arms are called different.
     pub level: f64,
     /// How many numbers were compared.
     pub comparisons: usize,
@@ -57,7 +57,7 @@ pub struct ParameterDifference {
     pub name: String,
     /// The value in `a`, SI units.
     pub a: f64,
-    /// In `b`.
+    /// The value in `b`.
     pub b: f64,
     /// b − a.
     pub difference: f64,
@@ -78,7 +78,7 @@ pub struct FrictionDifference {
     pub velocities: Vec<f64>,
     /// Friction there in `a`, N·m or N.
     pub a: Vec<f64>,
-    /// In `b`.
+    /// The values in `b`.
     pub b: Vec<f64>,
     /// b − a.
     pub difference: Vec<f64>,
@@ -100,7 +100,7 @@ pub struct ConstantDifference {
     pub joint: usize,
     /// The joint's constant torque in `a`, N·m or N.
     pub a: f64,
-    /// In `b`.
+    /// The value in `b`.
     pub b: f64,
     /// b − a.
     pub difference: f64,
@@ -126,7 +126,7 @@ pub struct TorqueDifference {
 }
 
 impl TorqueDifference {
-    /// In words.
+    /// The difference in words.
     #[must_use]
     pub fn in_words(&self) -> String {
         let TorqueDifference { joint, rms, expected, relative } = self;

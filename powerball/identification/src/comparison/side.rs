@@ -1,4 +1,4 @@
-//! One of two fits: its values and how well they are known.
+//! One of two fits: its values and their errors.
 
 use super::result::CompareError;
 use super::strokes::{Stroke, strokes};
@@ -30,7 +30,7 @@ pub struct Side {
     pub unusable: Vec<String>,
 }
 
-/// What is read of `identified.json` or `model.json`.
+/// The part of `identified.json` or `model.json` that is read.
 #[derive(Deserialize)]
 struct File {
     arm: String,

@@ -93,8 +93,8 @@ fn stroke(q: &[f64], v: &[f64], torque: &[f64], side: f64) -> Option<Stroke> {
     })
 }
 
-/// By joint how friction differs, `b` less `a`; `None` where the logs do not run one path, or the joint does not go both
-/// ways often enough.
+/// The difference of friction by joint, `b` minus `a`; `None` where the logs do not run one path, or the
+/// joint does not go both ways often enough.
 pub(super) fn changes(a: &[Vec<Stroke>], b: &[Vec<Stroke>]) -> Vec<Option<Change>> {
     let pairs: Vec<Option<Vec<(Stroke, Stroke)>>> = a.iter().zip(b).map(|(a, b)| matched(a, b)).collect();
     // A joint that rests in both says nothing; one on another path says that the others' torques are others.

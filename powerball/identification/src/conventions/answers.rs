@@ -21,7 +21,7 @@ fn percent(shares: &[f64]) -> Vec<Option<f64>> {
     shares.iter().map(of).collect()
 }
 
-/// Where the error falls most: `held-out error of joint 2 falls from 57 to 1.2 % of its torque`.
+/// The joint whose error falls most: `held-out error of joint 2 falls from 57 to 1.2 % of its torque`.
 fn falls(before: &[f64], after: &[f64]) -> String {
     let ratio = |j: &usize| after[*j] / before[*j];
     let moving = (0..before.len()).filter(|j| ratio(j).is_finite());
@@ -115,7 +115,7 @@ fn in_words(change: &Change, rival: bool, unit: &Unit, why: &str) -> (&'static s
     }
 }
 
-/// What factors by joint show about the torque columns.
+/// The conclusion from factors by joint about the torque columns.
 fn factors_in_words(unit: &Unit) -> &'static str {
     match unit {
         Unit::BeforeGear(_) => {
@@ -161,7 +161,7 @@ pub(super) fn of_arm_file(better: &Better) -> Answer {
     }
 }
 
-/// What is to be reported about the arm file where no change of it fits better.
+/// The answer about the arm file if no change of it fits better.
 fn arm_file(facts: &Facts<'_>) -> Answer {
     let Facts { doubts, good, .. } = *facts;
     if !doubts.is_empty() {

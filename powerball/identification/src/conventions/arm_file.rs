@@ -19,9 +19,9 @@ use powerball_controller::JointNumber;
 use powerball_logs::parallel;
 use powerball_logs::regression::{Recording, newton_euler};
 
-/// Where no joint's held-out error is more than this share of its torque, the arm file is this arm's.
+/// If no joint's held-out error is more than this share of its torque, the arm file belongs to this arm.
 const NOTICED: f64 = 0.02;
-/// Of more changes than this, those that fit best on few rows are asked on more.
+/// If there are more changes than this, those that fit best on few rows are tested on more.
 const LISTED: usize = 20;
 /// A change is clear where squared errors fall to this share, as the geometric mean over joints, both ways round. The
 /// files of eight measured arms have none that is; of the UR10e's the best comes to 0.95 (docs/conventions.md).
@@ -203,7 +203,7 @@ impl Table {
     }
 }
 
-/// As arm files have it.
+/// An angle in the form of arm files.
 fn angle(angle: &Angle) -> String {
     match angle {
         Angle::PiMultiple(multiple) if *multiple == integer(0) => "\"0\"".to_string(),

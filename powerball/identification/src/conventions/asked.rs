@@ -12,7 +12,7 @@ use powerball_logs::signal::Butterworth;
 use powerball_logs::signal::resample::{cubic, linear, median_step};
 use std::ops::Range;
 
-/// How much of the logs is looked at: seconds, and samples a second.
+/// The part of the logs that is used: seconds, and samples per second.
 #[derive(Clone, Copy, Debug)]
 struct Size {
     seconds: f64,
@@ -108,11 +108,11 @@ impl<'a> Asked<'a> {
 
 // Logs made small: what a column is shows at a few samples a second, and in a few minutes.
 
-/// What is slower than this share of the rate is kept.
+/// Signals slower than this share of the rate are kept.
 const KEPT: f64 = 0.25;
 /// Shorter stretches say nothing, s.
 const SHORTEST: f64 = 1.0;
-/// Of long logs stretches of this length are taken, s.
+/// Stretches of this length are taken from long logs, s.
 const STRETCH: f64 = 10.0;
 
 /// The logs on even grids of about `rate` samples a second, at most `most` seconds of them in all, evenly

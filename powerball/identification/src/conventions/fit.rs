@@ -168,7 +168,7 @@ pub(super) fn factors_of_body(rows: &Rows<'_>, read: &Torques, part: usize, ridg
         let mean = (kappa.iter().map(|k| k.ln()).sum::<f64>() / n as f64).exp();
         kappa.iter_mut().for_each(|k| *k /= mean);
         theta[..inertial].iter_mut().for_each(|x| *x *= mean);
-        // At first all joints count alike: one with another factor would be passed over.
+        // At first all joints have equal weight: otherwise one with another factor would be missed.
         for (joint, variance) in variance.iter_mut().enumerate().filter(|_| 2 * step > STEPS) {
             let of = &sums[joint][part];
             let mut own = theta.clone();

@@ -40,7 +40,7 @@ use search::{Found, gravity_is, search};
 #[must_use]
 pub fn conventions(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Conventions {
     let mut result = asked_of_arm(body, logs, validate);
-    // What signals say against themselves needs no arm.
+    // Doubts from the signals themselves need no arm.
     let mut doubts: Vec<&Doubt> = Vec::new();
     for doubt in logs.iter().chain(validate).flat_map(|log| &log.doubts) {
         if !doubts.contains(&doubt) {
@@ -70,7 +70,7 @@ fn asked_of_arm(body: &RigidArm, logs: &[Log], validate: &[Log]) -> Conventions 
     let better =
         if moves && body.filed().doubts().is_empty() { arm_file::better(&asked, &found) } else { None };
     let Some(better) = better else { return result(&asked, &found, kind) };
-    // What the columns are is evaluated with the arm that they fit.
+    // The columns are evaluated with the arm that they fit.
     let answer = answers::of_arm_file(&better);
     let of_other = RigidArm::new(&better.change.arm).ok().and_then(|body| {
         let asked = Asked::new(&body, logs, validate);

@@ -5,7 +5,7 @@
 
 use super::fit::{FRICTION, PartFit, Rows};
 
-/// Samples of a part that are looked at.
+/// Samples of a part that are used.
 const SAMPLES: usize = 300;
 /// Errors of neighbouring rows are alike: standard errors of independent rows are multiplied by this.
 const ALIKE: f64 = 3.0;
@@ -97,7 +97,7 @@ impl Energies {
 fn estimate(share: &[f64], fit: &PartFit) -> Estimate {
     let dot = |x: &[f64]| share.iter().zip(x).map(|(a, b)| a * b).sum::<f64>();
     let seen = fit.solver.solve(share);
-    // What no kept column shows is not determined.
+    // Parameters that no kept column shows are not determined.
     let kept = fit.solver.kept();
     let lost = share.iter().enumerate().any(|(c, s)| *s != 0.0 && kept.binary_search(&c).is_err());
     let std = ALIKE * dot(&seen).max(0.0).sqrt();

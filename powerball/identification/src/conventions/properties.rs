@@ -165,7 +165,7 @@ pub(super) fn unit(found: &Found<'_>, scale: Scale) -> Unit {
 
 /// Standard errors from zero at which a sign is sure.
 const SURE: f64 = 5.0;
-/// What speaks against it must be nearer to zero than this.
+/// Evidence against it must be nearer to zero than this.
 const AGAINST: f64 = 3.0;
 
 /// The joints that friction drives where it brakes the others: their torque or their position has the other
@@ -307,7 +307,7 @@ fn is_noisy(torque: &[f64], q: &[f64]) -> bool {
 // The first moments of the links show twice: in gravity and in inertia. Where gravity was taken out of the
 // torques, inertia still shows them, and the weight that they would have is missing.
 
-/// Samples that are looked at.
+/// Samples that are used.
 const SAMPLES: usize = 500;
 /// Gravity acts on a joint where it is more than this share of its torque.
 const ACTS: f64 = 0.2;

@@ -7,7 +7,7 @@ use super::properties::{Common, Unit};
 use powerball_controller::JointNumber;
 use serde::Serialize;
 
-/// Of a joint's torque more than this share is much.
+/// A share of a joint's torque above this counts as large.
 const MUCH: f64 = 0.5;
 
 /// The meaning of the torque and position columns of some logs. Nothing was modified.
@@ -86,17 +86,17 @@ pub enum PerJoint<T> {
 pub enum Side {
     /// Behind gear and bearings: hardly any friction is in it.
     Link,
-    /// At the motor: friction is in it.
+    /// The torque is at the motor: friction is included.
     Motor,
 }
 
 /// Whether torques contain gravity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum GravityIs {
-    /// They do.
+    /// Torques contain gravity.
     #[serde(rename = "included")]
     Included,
-    /// It was taken out of them.
+    /// Gravity was taken out of the torques.
     #[serde(rename = "taken out")]
     TakenOut,
 }
@@ -105,7 +105,7 @@ pub enum GravityIs {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// By a sensor or a current.
+    /// Measured by a sensor or a current.
     Measured,
     /// A controller's output.
     Commanded,
@@ -134,8 +134,7 @@ impl Conventions {
         self.answers.iter().any(|answer| answer.as_said == Some(false))
     }
 
-    /// What is reported about gravity where it may have been taken out of the torques: a balanced arm looks
-    /// the same.
+    /// The note about gravity if it may have been taken out of the torques: a balanced arm looks the same.
     fn doubt(&self) -> Option<&str> {
         let open = |a: &&Answer| a.question == "gravity" && a.as_said.is_none();
         let answer =
@@ -143,7 +142,7 @@ impl Conventions {
         answer.map(|a| a.sentence.as_str())
     }
 
-    /// Whether the verdict says more than that nothing speaks against the columns.
+    /// Whether the verdict says more than that nothing contradicts the columns.
     #[must_use]
     pub fn is_remarkable(&self) -> bool {
         self.differ() || self.is_unclear() || self.doubt().is_some()
@@ -210,7 +209,7 @@ impl Conventions {
 
 // The column map that would set columns right.
 
-/// What one column needs.
+/// The correction of one column.
 #[derive(Clone, Debug, PartialEq)]
 struct Column {
     from: usize,

@@ -124,7 +124,7 @@ pub(super) fn search<'a>(asked: &Asked<'a>) -> Result<Found<'a>, DataError> {
         let Some(next) = next(asked, &found)? else { break };
         found = next;
     }
-    // What ends in a poor fit is no reading.
+    // A search that ends in a poor fit is not a reading.
     if !found.steps.is_empty() && !found.is_good() {
         let read = Reading::plain(asked.body.dof());
         let rows = asked.rows(&read.positions, read.gravity)?;

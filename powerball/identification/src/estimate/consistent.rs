@@ -346,7 +346,7 @@ pub fn consistent_fit(body: &RigidArm, solution: &Solution) -> Result<Consistent
 }
 
 impl ConsistentFit {
-    /// In the words of a report.
+    /// The result in the form of a report.
     #[must_use]
     pub fn report(&self, body: &RigidArm, solution: &Solution) -> ConsistentReport {
         let error = stats_of(solution, &self.theta);
@@ -379,8 +379,7 @@ const STATES: usize = 400;
 /// Velocities and accelerations where the arm file gives no limit.
 const SPEED: f64 = 1.0;
 const ACCELERATION: f64 = 3.0;
-/// What a unit of a parameter counts compared with a N·m: directions that no torque shows are held by it
-/// alone.
+/// Weight of a unit of a parameter compared with a N·m: it alone holds directions that no torque shows.
 const UNSEEN: f64 = 1e-2;
 
 /// Torque differences of a parameter set's values over random states within an arm's limits.

@@ -25,7 +25,7 @@ use powerball_logs::vector::{NORMAL, median};
 
 /// Misses up to this many deviations are believed.
 const BELIEVED: f64 = 3.0;
-/// From this many on nothing is.
+/// From this many deviations on, nothing is believed.
 const DISCARDED: f64 = 6.0;
 /// Rounds in which far misses still count: the first model is bent by them, and must not be the judge alone.
 const GENTLE_ROUNDS: usize = 5;
@@ -325,7 +325,7 @@ fn columns(data: &Data<'_>, start: &Solution, joint: usize) -> (Vec<usize>, Vec<
     (global, columns)
 }
 
-/// Positions from every second sample of a log, the others not looked at.
+/// Positions from every second sample of a log, without the others.
 fn every_second(recording: &mut Recording, log: &Log, first: usize, smoothing: f64) {
     let end = recording.start + recording.len() as f64 / recording.rate;
     let from = log.t.partition_point(|t| *t < recording.start);

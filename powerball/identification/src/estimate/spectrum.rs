@@ -21,7 +21,7 @@ use powerball_logs::summary::OCTAVES;
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
-/// From the powers as they are; more steps sharpen what is uncertain about them.
+/// Steps from the uncorrected powers; more steps amplify their uncertainty.
 const STEPS: usize = 30;
 
 /// A power as an octave shows it.
@@ -68,7 +68,7 @@ pub(super) fn deconvolved(powers: &[Power]) -> Vec<f64> {
     if sharp.iter().any(|mean| !(*mean > 0.0 && mean.is_finite())) {
         return sharp;
     }
-    // What leaks out of octaves that nothing is known of is not missed.
+    // The leak from octaves without data is ignored.
     let leaks: Vec<Vec<f64>> = powers
         .iter()
         .map(|p| {

@@ -26,7 +26,7 @@ pub struct Uncertainty {
     /// Degrees of freedom of each coefficient's standard error; 0 where the logs do not determine it, or
     /// where it is at its bound.
     pub freedom: Vec<f64>,
-    /// By joint: the fitted logs in the eyes of the model.
+    /// By joint: the weights of the model along the fitted logs.
     pub path: Vec<Path>,
 }
 

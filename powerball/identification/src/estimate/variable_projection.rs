@@ -215,7 +215,7 @@ pub(super) fn tangent(g: f64, v: f64) -> f64 {
     slope(g, v, (g * v).tanh())
 }
 
-/// As [`tangent`], where t = tanh(γ·q̇) is known.
+/// Like [`tangent`], if t = tanh(γ·q̇) is known.
 fn slope(g: f64, v: f64, t: f64) -> f64 {
     g * v * (1.0 - t * t)
 }
@@ -404,6 +404,6 @@ pub(super) trait SeparableRows: Sync {
     /// Cross products of one joint's columns tanh(γ·q̇) for some γ with all others, with each other and with
     /// the torque.
     fn trials(&self, at: &Self::At, joint: usize, steep: &[f64]) -> Trials;
-    /// What coefficients leave.
+    /// The residual of coefficients.
     fn scatter(&self, at: &Self::At, theta: &[f64]) -> Scatter;
 }

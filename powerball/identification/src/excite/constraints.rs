@@ -13,9 +13,9 @@ use powerball_logs::motion::Motion;
 /// Instants a second at which the search looks at a path: between two of them a wrist at 40 m/s² comes at
 /// most two millimetres nearer than at either.
 const RATE: f64 = 50.0;
-/// What the search keeps beyond the clearance for that, m.
+/// Additional clearance of the search for that, m.
 const BETWEEN: f64 = 2e-3;
-/// As [`BETWEEN`], for torques, as a share of the limit.
+/// Like [`BETWEEN`], for torques, as a share of the limit.
 const TORQUE_BETWEEN: f64 = 0.01;
 
 /// The capsules of an arm, and how far they are to stay apart.
@@ -34,9 +34,9 @@ pub struct Space {
 pub struct Constraints {
     /// Positions, velocities and accelerations.
     pub limits: Limits,
-    /// Floor and links, where they are looked at.
+    /// Floor and links, if they are checked.
     pub space: Option<Space>,
-    /// Torques, where they are looked at.
+    /// Torques, if they are checked.
     pub load: Option<Load>,
     /// Position of the arm before it moves to the path's beginning, each joint straight there, rad.
     pub from: Option<Vec<f64>>,
@@ -47,7 +47,7 @@ pub struct Constraints {
 pub struct Tightest {
     /// The nearest approach, and when, s.
     pub nearest: Option<(Nearness, f64)>,
-    /// The largest torque of each joint, N·m, where torques are looked at.
+    /// The largest torque of each joint, N·m, if torques are checked.
     pub torque: Option<Vec<f64>>,
 }
 
@@ -171,7 +171,7 @@ fn whole(path: &Fourier, ends: bool) -> Motion {
     motion
 }
 
-// What the joints may do, from the arm file.
+// The limits of the joints, from the arm file.
 
 /// The limits of one joint, rad (m for prismatic joints) and s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -228,7 +228,7 @@ impl Limits {
     }
 }
 
-// What stands around an arm: the floor, and the arm's own links as capsules.
+// The space around an arm: the floor, and the arm's own links as capsules.
 
 /// Radius of the links' capsules, m, where none is given.
 pub const RADIUS: f64 = 0.06;

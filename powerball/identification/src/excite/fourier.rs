@@ -56,7 +56,7 @@ impl Harmonics {
 }
 
 impl Fourier {
-    /// From the first to the last instant, s.
+    /// Time from the first to the last instant, s.
     pub fn duration(&self) -> f64 {
         self.periods as f64 * self.period() + self.ramp
     }

@@ -36,10 +36,10 @@ pub struct Masses {
 }
 
 impl Masses {
-    /// From a file of an arm, as [`Masses::parse`] takes its text.
+    /// Reads a file of an arm, whose text [`Masses::parse`] takes.
     ///
     /// # Errors
-    /// As there, and where it cannot be read.
+    /// Those of [`Masses::parse`], and a file that cannot be read.
     pub fn read(path: &Path, arm: &Arm) -> Result<Masses, Error> {
         let file = path.display().to_string();
         let text =
@@ -47,11 +47,11 @@ impl Masses {
         Masses::parse(&text, &file, &Model::derive(arm.clone())?)
     }
 
-    /// From a values file (`{"parameter": number, …}`, as `dyngen` takes it), or from an identified.json,
-    /// whose consistent parameters and friction are taken.
+    /// Reads the text of a values file (`{"parameter": number, …}`, as `dyngen` takes it), or of an
+    /// identified.json, whose consistent parameters and friction are taken.
     ///
     /// # Errors
-    /// What the file lacks, or names that the arm does not have.
+    /// Missing values of the file, or names that the arm does not have.
     pub fn parse(text: &str, file: &str, model: &Model) -> Result<Masses, Error> {
         let wrong = |what: String| Error::Setting(format!("{file}: {what}"));
         let json: serde_json::Value =

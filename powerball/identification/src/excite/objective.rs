@@ -59,7 +59,7 @@ impl Figures {
         }
     }
 
-    /// The figures of a path that does not determine the parameters, or that was not looked at.
+    /// The figures of a path that does not determine the parameters, or that was not evaluated.
     pub const NOTHING: Figures = Figures { condition: f64::INFINITY, least: 0.0, mean: 0.0 };
 }
 

@@ -110,8 +110,8 @@ struct Judged<J> {
 }
 
 impl<J> Judged<J> {
-    /// What keeps the constraints is better than what does not; then the smaller violation, then the value
-    /// counts.
+    /// A path that keeps the constraints is better than one that does not; then the smaller violation, then
+    /// the value counts.
     fn rank(&self) -> (f64, f64) {
         (self.violation, self.value)
     }
@@ -276,7 +276,7 @@ fn search_from<J: Clone>(
     }
 }
 
-/// The candidates judged, where they are better than the best so far; what is dear is looked at last.
+/// The candidates judged, if they are better than the best so far; expensive checks come last.
 fn improved<J>(
     best: &Judged<J>,
     candidates: Vec<Candidate>,
@@ -349,7 +349,7 @@ impl Candidate {
 
     /// Changes one or two joints.
     fn changed(&self, step: f64, constrained: bool, rng: &mut ChaCha8Rng) -> Candidate {
-        // What is narrow can be too narrow for a joint's usual range.
+        // A narrow range can be too narrow for a joint's usual range.
         let least = if constrained { 0.02 } else { 0.2 };
         let mut next = self.clone();
         let joints: Vec<usize> = (0..self.shape.len()).collect();

@@ -45,7 +45,7 @@ impl fmt::Display for Contact {
 pub struct Nearness {
     /// m
     pub distance: f64,
-    /// What.
+    /// The nearest pair.
     pub contact: Contact,
 }
 
@@ -81,14 +81,14 @@ pub struct Floor {
     moving: Vec<bool>,
 }
 
-/// What a joint's row goes across its axes, a and b, m.
+/// The part of a joint's row across its axes, a and b, m.
 fn normal(joint: &Joint) -> Vector3<f64> {
     Vector3::new(to_f64(&joint.a), to_f64(&joint.b), 0.0)
 }
 
 impl Shape {
     /// The capsules of an arm, of one radius (m). Parts that touch in every pose within the limits are not
-    /// looked at again: see [`Shape::always_touching`].
+    /// checked again: see [`Shape::always_touching`].
     #[must_use]
     pub fn new(arm: &Arm, limits: &[JointLimits], radius: f64) -> Shape {
         let modified = arm.convention == Convention::Modified;

@@ -27,15 +27,15 @@ pub struct ExciteOptions<'a> {
     pub mountings: Vec<Mounting>,
     /// Floor and links, if they are checked.
     pub collision: Option<Collision>,
-    /// The arm's masses for the torque limits, where those are looked at.
+    /// The arm's masses for the torque limits, if those are checked.
     pub masses: Option<MassSource>,
     /// The pose before the trajectory, rad: the straight way from there to its beginning is kept free too.
     pub from: Option<Vec<f64>>,
-    /// Where progress is reported.
+    /// The receiver of progress reports.
     pub progress: Progress<'a>,
 }
 
-/// How floor and links are looked at.
+/// How floor and links are checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Collision {
     /// The floor; where none is given it is at 0 where the base stands upright and the arm can be above it,
@@ -137,7 +137,7 @@ pub fn excite(arm: &Arm, options: &ExciteOptions<'_>) -> Result<Excited, Error> 
     options.progress.say("searching");
     let found = optimise_all(&tasks, options.parameters, &options.search)?;
     let motions: Vec<Motion> = found.paths.iter().map(|path| path.sample(options.rate)).collect();
-    // What is given is looked at once more, sample by sample.
+    // The results are checked once more, sample by sample.
     for (task, motion) in tasks.iter().zip(&motions) {
         if let Some(why) = task.constraints.broken(motion) {
             return Err(Error::Broken(why));
@@ -190,7 +190,7 @@ fn check(arm: &Arm, options: &ExciteOptions<'_>) -> Result<(), Error> {
     }
 }
 
-/// What each mounting's path must keep; what had to be assumed for it.
+/// The constraints of each mounting's path; the assumptions for them.
 fn tasks<'m>(
     arm: &Arm,
     models: &'m [Model],

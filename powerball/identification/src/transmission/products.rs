@@ -15,7 +15,7 @@ use powerball_logs::signal::{Band, difference, motion};
 
 /// Length of a block, s: one to three correlation times of what is left.
 const BLOCK: f64 = 0.5;
-/// Fewer blocks of motion say nothing.
+/// Least number of blocks of motion for a result.
 const FEWEST_BLOCKS: usize = 12;
 
 /// Products of all columns over some rows.
@@ -208,7 +208,7 @@ impl Scales {
     pub(super) fn new(top: f64) -> Scales {
         Scales {
             // From a step to a third of the velocities: friction that is sharper than what is tried would be
-            // taken for presliding.
+            // mistaken for presliding.
             widths: geometric(1e-3 * top, 0.3 * top, Column::WIDTHS),
             distances: geometric(1e-4, 0.02, Column::DISTANCES),
             bumps: geometric(0.02 * top, 0.3 * top, Column::BUMPS),
@@ -319,7 +319,7 @@ const BAND: f64 = 10.0;
 /// Smoothing of positions, Hz. Reversals are sharp, and what friction does at them tells its law; noise of
 /// accelerations above the band does not count.
 const SMOOTHING: f64 = 25.0;
-/// Shorter pieces say nothing, s.
+/// Shortest piece that is used, s.
 const SHORTEST: f64 = 1.0;
 /// Parts of logs that are held out in turn.
 const PARTS: usize = 3;

@@ -25,7 +25,8 @@ const MOST: usize = 3;
 /// Another effect that leaves no more than this many times what the chosen one leaves could be there in its
 /// place.
 const AS_GOOD: f64 = 1.1;
-/// Where more of a motor's torque stays, it is not this joint's: less than half of its square is explained.
+/// If more of a motor's torque stays, it does not belong to this joint: less than half of its square is
+/// explained.
 const UNRELATED: f64 = 0.7;
 /// A link torque of which this share is noise tells no ratio.
 const NOISE: f64 = 0.5;
@@ -179,7 +180,7 @@ pub(super) fn tell(
     }
 }
 
-// What a transmission may hold in addition to friction and rotor.
+// Effects that a transmission may have in addition to friction and rotor.
 
 /// Figures of an effect by name, SI units.
 pub type Figures = BTreeMap<&'static str, f64>;

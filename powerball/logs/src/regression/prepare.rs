@@ -61,7 +61,7 @@ pub struct Data<'a> {
     pub logs: Vec<String>,
     /// The velocity below which a joint rests, by joint, rad/s.
     pub rest_velocity: Vec<f64>,
-    /// By joint: why its samples say nothing, in words.
+    /// By joint: the reason why its samples carry no information.
     pub inactive: Vec<Option<String>>,
     /// Pieces of logs, and joints of some logs, that were left out, in words.
     pub left_out: Vec<String>,
@@ -192,7 +192,7 @@ impl<'a> Data<'a> {
         Ok(bands.into_iter().zip(joints).map(of_band).collect())
     }
 
-    /// These rows with other signals: samples, band and blocks stay as they are.
+    /// These rows with other signals: samples, band and blocks are not changed.
     #[must_use]
     pub fn seen_otherwise(&self, correct: impl FnMut(&mut Recording)) -> Data<'a> {
         let mut recordings = self.recordings.to_vec();

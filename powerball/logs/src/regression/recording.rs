@@ -121,7 +121,7 @@ impl Recording {
     }
 }
 
-/// What positions pass before they are differentiated, and torques with them.
+/// The filter for positions before they are differentiated, and for torques with them.
 fn smoother(smoothing: f64, rate: f64) -> Option<Butterworth> {
     Butterworth::low_pass(4, smoothing.min(0.4 * rate), rate)
 }

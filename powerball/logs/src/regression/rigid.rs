@@ -142,7 +142,7 @@ impl RigidArm {
         out
     }
 
-    /// As [`Self::regressor`], into a slice of n × p numbers a sample.
+    /// Like [`Self::regressor`], into a slice of n × p numbers per sample.
     pub fn regressor_into(&self, q: &[f64], v: &[f64], a: &[f64], out: &mut [f64]) {
         let [q, v, a] = self.of_joints([q, v, a]);
         self.regressor.evaluate(&q, &v, &a, &[], out);
@@ -301,7 +301,7 @@ fn pick(wide: &Wide, chosen: &[usize], q: &[f64], v: &[f64], a: &[f64], n: usize
     Some(out)
 }
 
-// What level gravity hides: parameters that no motion shows until gravity comes from another side.
+// Parameters that a vertical gravity hides: no motion shows them until gravity has another direction.
 
 /// Poses at which it is seen whether a gravity from another side shows a parameter.
 const HIDDEN_POSES: usize = 8;

@@ -90,7 +90,7 @@ fn leave_out<'k>(
     }
 }
 
-// Joints whose samples say nothing, and why.
+// Joints whose samples carry no information, and the reason.
 
 /// A joint that moves by less than this in all logs only winds up its gear and its seals: its friction is not
 /// sliding friction, and nothing that depends on position or velocity can be distinguished from a constant.
@@ -142,7 +142,7 @@ impl Inactive {
         }
     }
 
-    /// In words, for the joint numbered from 1.
+    /// The note in words, for the joint numbered from 1.
     fn note(&self, joint: usize, unit: &str) -> String {
         let lost = "neither its friction nor any effect on it can be judged, and its torque was not used";
         match self {
@@ -171,7 +171,7 @@ pub(super) fn dead(recording: &Recording, joint: usize) -> bool {
     torque.first().is_none_or(|first| torque.iter().all(|t| t == first))
 }
 
-// What is to be reported about joints that rest in the logs.
+// Notes about joints that rest in the logs.
 
 /// Least number of rows of a joint for a result about it: 0.8 s of motion in the widest band.
 pub const FEWEST_ROWS: usize = 14;

@@ -160,7 +160,7 @@ pub(super) fn saturated(logs: &[Log], joint: usize) -> Vec<Vec<[f64; 2]>> {
     logs.iter().map(of).collect()
 }
 
-/// What is reported about a joint's spans, a sentence a log.
+/// The note about a joint's saturated spans, one sentence per log.
 pub(super) fn saturation_notes(logs: &[Log], joint: usize, spans: &[Vec<[f64; 2]>]) -> Vec<String> {
     let note = |(log, spans): (&Log, &Vec<[f64; 2]>)| {
         let seconds: f64 = spans.iter().map(|[from, to]| to - from).sum();

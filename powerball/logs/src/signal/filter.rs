@@ -10,7 +10,7 @@ use crate::batch::{self, Work};
 /// accelerations are noise of positions differentiated twice, and arms are hardly rigid; a motion and what
 /// friction does at its reversals are slower than the narrowest.
 pub const BANDS: [f64; 3] = [7.0, 3.5, 1.75];
-/// What is left out at each end of a stretch, s.
+/// Time that is left out at each end of a stretch, s.
 const ENDS: f64 = 0.3;
 
 /// A low-pass band with its decimation, the same on both sides of a regression.
@@ -34,7 +34,7 @@ pub struct Band {
 /// A filter and a decimation.
 #[derive(Clone, Debug)]
 struct Stage {
-    /// At the rate of its samples.
+    /// The filter at the rate of its samples.
     filter: Option<Butterworth>,
     /// The filter at full rate, for what is not decimated.
     whole: Option<Butterworth>,

@@ -32,7 +32,7 @@ struct Head {
     arm: String,
     /// Hexadecimal.
     arm_hash: String,
-    /// In the base frame, m/s²: how the base was mounted.
+    /// Gravity in the base frame, m/s²: the mounting of the base.
     gravity: [f64; 3],
     set: String,
     parameters: Vec<String>,
@@ -139,10 +139,10 @@ impl Summary {
         bytes.starts_with(format!("{{\"format\":\"{FORMAT}\"").as_bytes())
     }
 
-    /// From bytes that begin with a summary's; also those after it.
+    /// Reads a summary from the beginning of `bytes`; also returns the bytes after it.
     ///
     /// # Errors
-    /// [`SummaryError::Unreadable`] where they are no summary, of another version, or damaged.
+    /// [`SummaryError::Unreadable`] if they are not a summary, of another version, or damaged.
     pub fn from_bytes(bytes: &[u8]) -> Result<(Summary, &[u8]), SummaryError> {
         let unreadable = |why: &str| SummaryError::Unreadable(why.to_string());
         if !Summary::is_summary(bytes) {
@@ -163,7 +163,7 @@ impl Summary {
         let width = Columns { inertial: head.parameters.len() }.width();
         let joints = head.steepness.len();
         let (numbers, after) = numbers.split_at(head.bytes.min(numbers.len()));
-        // Zeros take little room in the file: a file that claims billions of rows is damaged.
+        // Zeros take little space in the file: a file that claims billions of rows is damaged.
         let shaped = head.nodes == NODES
             && joints <= MOST_JOINTS
             && head.parameters.len() <= 16 * MOST_JOINTS
@@ -205,7 +205,7 @@ const MOST: u32 = 52;
 /// Bits of a double, and of what says how many there are.
 const DOUBLE: u32 = 64;
 const HEADER: u32 = 7;
-/// In place of a step: the column is zero.
+/// Marks a column that is zero, in place of a step.
 const NOTHING: i16 = i16::MIN;
 
 /// The bytes of the factors of some joints.

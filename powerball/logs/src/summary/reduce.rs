@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 
 /// A log is worked on in parts of this length, s.
 const PART: f64 = 120.0;
-/// What neighbouring parts share, s: twice what a band leaves out at an end.
+/// Overlap of neighbouring parts, s: twice the time that a band leaves out at an end.
 const OVERLAP: f64 = 0.6;
 
 /// The columns of a joint's rows in a reduced log: the minimal set, q̇, 1, tanh(γ·q̇) at the nodes of its
@@ -111,7 +111,7 @@ impl Summary {
 /// the options. Returns notes on the samples that were left out in the first band.
 ///
 /// # Errors
-/// [`DataError`] where nothing of the log can be used in the first band; nothing has been taken in then. A
+/// [`DataError`] where nothing of the log can be used in the first band; nothing has been added then. A
 /// log that is too short for a narrower band is missing from that band alone.
 pub(super) fn push_in_bands(
     summaries: &mut [Summary],
@@ -386,7 +386,7 @@ impl Bands {
     /// Adds a log. Returns notes on the samples that were left out.
     ///
     /// # Errors
-    /// [`DataError`] where nothing of the log can be used; nothing has been taken in then. A log that is too
+    /// [`DataError`] where nothing of the log can be used; nothing has been added then. A log that is too
     /// short for a narrow band is missing from that band alone.
     pub fn push(
         &mut self,
@@ -418,10 +418,10 @@ impl Bands {
         self.bands.iter().flat_map(Summary::to_bytes).collect()
     }
 
-    /// From the bytes of a file.
+    /// Reads the bytes of a file.
     ///
     /// # Errors
-    /// [`SummaryError::Unreadable`] where they are no summary, of another version, or damaged.
+    /// [`SummaryError::Unreadable`] if they are not a summary, of another version, or damaged.
     pub fn from_bytes(bytes: &[u8]) -> Result<Bands, SummaryError> {
         let (mut bands, mut rest) = (Vec::new(), bytes);
         while bands.len() < BANDS.len() {

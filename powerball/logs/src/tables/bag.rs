@@ -157,7 +157,7 @@ pub(super) fn unpacked_head(path: &Path, length: u64) -> io::Result<Vec<u8>> {
     Ok(head)
 }
 
-/// What is reported where a build lacks a format.
+/// The message for a format that a build lacks.
 macro_rules! reader {
     ($feature:literal, $function:ident, $read:expr) => {
         #[cfg(feature = $feature)]

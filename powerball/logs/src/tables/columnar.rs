@@ -25,7 +25,7 @@ const ROWS_A_BYTE: u64 = 64;
 /// Rows that are in memory at a time.
 #[cfg(feature = "parquet")]
 const ROWS: usize = 8192;
-/// As [`ROWS`], where rows hold texts or pictures.
+/// Like [`ROWS`], for rows that hold texts or pictures.
 #[cfg(feature = "parquet")]
 const ROWS_OF_TEXTS: usize = 256;
 

@@ -59,7 +59,7 @@ pub struct Contents {
 }
 
 impl Format {
-    /// By the first bytes of a file.
+    /// The format by the first bytes of a file.
     #[must_use]
     pub fn of(head: &[u8]) -> Format {
         let begins = |magic: &[u8]| head.starts_with(magic);
@@ -138,7 +138,7 @@ fn shown(path: &Path) -> String {
 /// one message after the other; pictures and the like stay on the disk.
 ///
 /// # Errors
-/// Where the file cannot be read, is torn, or is of a format that this build does not have.
+/// If the file cannot be read, is truncated, or has a format that this build does not have.
 pub fn read_contents(path: &Path) -> Result<Contents, LogError> {
     read_topics(&mut Place::of(path)?, &shown(path), None)
 }
@@ -251,7 +251,7 @@ arrays!("npy", "npz", npy_tables, super::npz::read_array);
 arrays!("mat", "mat", mat_tables, super::mat::read);
 arrays!("HDF5", "hdf5", hdf5_tables, super::hdf5::read);
 
-// What is odd about a log, and why one cannot be used.
+// Faults of a log, and the reasons why one cannot be used.
 
 /// Something about a log that its user should know.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -125,7 +125,7 @@ fn array(name: &str, set: &Dataset, memory: &mut Memory) -> Result<Array, String
     Ok(Array { name: name.into(), shape, columns_first, values })
 }
 
-/// What MATLAB calls the class of an array or a group, where it wrote it.
+/// MATLAB's class of an array or a group, if MATLAB wrote it.
 fn class(attributes: Result<HashMap<String, AttrValue>, Error>) -> Option<String> {
     match attributes.ok()?.remove("MATLAB_class")? {
         AttrValue::String(class) | AttrValue::AsciiString(class) => Some(class),

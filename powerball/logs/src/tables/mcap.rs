@@ -277,7 +277,7 @@ impl<'t> Records<'t> {
         Ok(None)
     }
 
-    /// What a file means that cannot be read further.
+    /// The result for a file that cannot be read further.
     fn torn(&self, error: &McapError) -> io::Result<Option<String>> {
         Ok(Some(match error {
             McapError::UnexpectedEof | McapError::RecordTooLarge { .. } | McapError::ChunkTooLarge(_) => {

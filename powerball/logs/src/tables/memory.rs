@@ -18,7 +18,7 @@ pub fn allow_memory(bytes: u64) {
     ALLOWED.store(bytes, Ordering::Relaxed);
 }
 
-/// What is free, bytes, where the system reports it: of the machine, and of the container where it has a limit.
+/// Free memory, bytes, if the system reports it: of the machine, and of the container if it has a limit.
 fn free() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
@@ -26,7 +26,7 @@ fn free() -> Option<u64> {
     Some(container().map_or(machine, |container| container.min(machine)))
 }
 
-/// What is free below the memory limit of this process's container (cgroup v2), bytes; `None` without a limit.
+/// Free memory below the limit of this process's container (cgroup v2), bytes; `None` without a limit.
 fn container() -> Option<u64> {
     let bytes = |file: &str| {
         let text = std::fs::read_to_string(format!("/sys/fs/cgroup/{file}")).ok()?;

@@ -14,7 +14,7 @@ use serde_json::Value;
 enum Reader {
     JointState,
     DynamicJointState,
-    /// By the definition that the file has.
+    /// Messages that are read by the definition in the file.
     Defined(Schema),
     #[cfg(feature = "protobuf")]
     Protobuf(protobuf::Schema),

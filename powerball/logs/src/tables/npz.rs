@@ -112,7 +112,7 @@ fn array(name: &str, bytes: &[u8], memory: &mut Memory) -> Result<Vec<Result<Arr
     Ok(read.collect())
 }
 
-/// What an array's elements are made of: `'<f8'`, or `[('t', '<f8'), ('q', '<f8', (6,))]`.
+/// The parts of an array's elements: `'<f8'`, or `[('t', '<f8'), ('q', '<f8', (6,))]`.
 fn parts(descr: &str) -> Result<Vec<Part<'_>>, String> {
     let quoted = |text: &'_ str| -> Option<(usize, usize)> {
         let begin = text.find('\'')? + 1;

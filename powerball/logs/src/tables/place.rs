@@ -1,9 +1,9 @@
-//! Where a log is: a file, a folder, or an address.
+//! The place of a log: a file, a folder, or an address.
 
 use super::contents::{Format, LogError};
 use std::path::{Path, PathBuf};
 
-/// What addresses begin with.
+/// The beginnings of addresses.
 const ADDRESSES: [&str; 3] = ["http://", "https://", "s3://"];
 
 /// Whether a path is an address, at which only the feature `remote` reads.

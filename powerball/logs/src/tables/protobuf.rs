@@ -16,7 +16,7 @@ use std::collections::HashSet;
 const DEEPEST: usize = 16;
 /// Times and spans of time: seconds and nanoseconds.
 const TIMES: [&str; 2] = ["google.protobuf.Timestamp", "google.protobuf.Duration"];
-/// What the time of a message is called.
+/// Names of the time of a message.
 const STAMPS: [&str; 3] = ["stamp", "timestamp", "time"];
 
 /// A type of messages.

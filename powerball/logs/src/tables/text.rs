@@ -13,7 +13,7 @@ pub(super) const HEAD: usize = 4096;
 /// The names of the columns are within this many bytes.
 const LONGEST_HEADER: u64 = 1 << 20;
 
-/// What files begin with that are no logs, and what they are.
+/// The first bytes of files that are not logs, and the kind of each.
 const OTHERS: [(&[u8], &str); 7] = [
     (b"\x89PNG", "a PNG picture"),
     (b"\xff\xd8\xff", "a JPEG picture"),
@@ -134,7 +134,8 @@ pub(crate) fn read(
     Ok(last_torn)
 }
 
-/// What stands between the names of the first line: names may hold blanks where commas or the like are there.
+/// The delimiter of the names in the first line: names may hold blanks if there are commas or other
+/// delimiters.
 fn delimiter(bytes: &[u8]) -> u8 {
     let header = bytes.split(|b| *b == b'\n').next().unwrap_or_default().trim_ascii();
     *b",;\t ".iter().find(|delimiter| header.contains(delimiter)).unwrap_or(&b',')

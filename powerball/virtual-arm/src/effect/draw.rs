@@ -23,7 +23,7 @@ pub struct Places {
     pub coupled: Vec<([usize; 2], f64)>,
     /// Stiffness of each joint's gear, N·m/rad or N/m.
     pub stiffness: Vec<Range<f64>>,
-    /// From the last frame to the flange, m.
+    /// Distance from the last frame to the flange, m.
     pub flange: f64,
 }
 
@@ -32,7 +32,7 @@ fn one_of<T: Clone>(from: &[T], rng: &mut impl Rng) -> Option<T> {
     if from.is_empty() { None } else { from.get(rng.random_range(0..from.len())).cloned() }
 }
 
-/// What is drawn for any effect, and where it may sit.
+/// Random values for any effect, and its possible places.
 struct Lot<'a> {
     plant: &'a Plant,
     places: &'a Places,

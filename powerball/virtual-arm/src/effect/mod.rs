@@ -19,7 +19,7 @@ const SLIDERS: usize = 4;
 /// addition to the play.
 const TEETH: f64 = 2.0e5;
 
-/// A gear that gives way: a spring between motor and link, with play.
+/// An elastic gear: a spring between motor and link, with play.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gear {
     /// Stiffness once the teeth touch, N·m/rad.
@@ -94,7 +94,7 @@ pub enum PlantEffect {
     FrictionByPosition {
         /// The joint.
         joint: usize,
-        /// By which share of itself it is higher and lower at most.
+        /// Largest share by which it is higher and lower.
         share: f64,
         /// Position at which the friction is highest, rad.
         place: f64,
@@ -105,7 +105,7 @@ pub enum PlantEffect {
         mass: f64,
         /// Centre of the body in the last frame, m.
         centre: [f64; 3],
-        /// From this time on, s.
+        /// Time from which on it acts, s.
         start: f64,
     },
     /// A hose or cable pulls the joint back.
@@ -144,7 +144,7 @@ pub enum PlantEffect {
     },
     /// Torques are logged late.
     TimeDelay {
-        /// By this much, s.
+        /// Delay, s.
         delay: f64,
     },
     /// A joint's zero is off.
@@ -167,14 +167,14 @@ pub enum PlantEffect {
         start: f64,
         /// How long each time, s.
         length: f64,
-        /// From one time to the next, s.
+        /// Time between two pushes, s.
         every: f64,
     },
     /// A link's centre of mass lies off the plane in which it was declared to lie.
     BrokenSymmetry {
         /// The link.
         link: usize,
-        /// By this much along the link's x axis, m.
+        /// Shift along the link's x axis, m.
         aside: f64,
     },
     /// A gear that winds up under its load; the encoder sits on the motor.

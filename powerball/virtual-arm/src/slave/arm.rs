@@ -164,7 +164,7 @@ impl VirtualArm {
         }
     }
 
-    /// What the sensors say at this instant, between two ticks: the current is the mean of `before` and
+    /// The sensors' values at this instant, between two ticks: the current is the mean of `before` and
     /// after.
     fn measure(&mut self, h: f64, before: &[f64]) {
         let sensors = self.simulation.plant().sensors();
@@ -241,7 +241,7 @@ pub fn serve(arm: &mut impl Peer, bus: &mut impl Bus, stop: impl Fn() -> bool) -
     Ok(slipped)
 }
 
-/// What a hiccup of the machine may cost and is made up for, µs.
+/// Longest interruption of the machine that is caught up, µs.
 const CATCH_UP: Micros = 20_000;
 
 /// Sends what the arm has to say.
@@ -255,7 +255,7 @@ fn speak(arm: &mut impl Peer, bus: &mut impl Bus) -> Result<(), BusError> {
     Ok(())
 }
 
-// What a joint's module is: the facts that its drive is set up with.
+// A joint's module: the facts with which its drive is set up.
 
 /// A mode in which the set-point is a current. The maker's public files have none, so this is declared and
 /// not known.

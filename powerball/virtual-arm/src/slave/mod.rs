@@ -29,7 +29,7 @@ use powerball_bus::cia402::Mode;
 /// Radians in a milli-degree, the drives' unit of angles.
 const DEGREE: f64 = std::f64::consts::PI / 180_000.0;
 
-/// What a drive's sensors say at one instant, at the joint.
+/// The values of a drive's sensors at one instant, at the joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Sample {
     /// rad.

@@ -13,7 +13,7 @@ use powerball_bus::canopen::{Cob, Frame, Micros, NodeId, Object, objects};
 use powerball_bus::cia402::{Controlword, Mode, State, objects as drive_objects, schunk};
 use std::collections::VecDeque;
 
-/// From reset to boot-up, µs.
+/// Time from reset to boot-up, µs.
 const BOOT_TIME: Micros = 50_000;
 
 /// Emergency codes that the node sends by itself.
@@ -264,7 +264,7 @@ impl Node {
         }
     }
 
-    /// What follows from a new value.
+    /// Applies a new value of an object.
     fn written(&mut self, object: Object) {
         match object {
             drive_objects::CONTROLWORD => {
@@ -373,7 +373,7 @@ impl Node {
         }
     }
 
-    /// What the dictionary tells the drive.
+    /// The commands of the dictionary to the drive.
     fn read_inputs(&self) -> Inputs {
         let number = |object| self.dictionary.get(object) as f64;
         let angle = |object| number(object) * DEGREE;

@@ -127,7 +127,7 @@ impl Pdo {
     }
 }
 
-// Where a drive wants its joint to be: ramps, profiles and the interpolation of set-points.
+// The demanded position of a joint: ramps, profiles and the interpolation of set-points.
 
 /// Position and velocity that the servo follows, rad and rad/s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

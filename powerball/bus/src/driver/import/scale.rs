@@ -14,7 +14,7 @@ const GEAR_RATIO: u16 = 0x6091;
 /// Feed, in counts / shaft revolutions.
 const FEED: u16 = 0x6092;
 
-/// Fewer counts in a turn than degrees are no scale of a joint: drives come with 1 / 1 where nobody has set them.
+/// Fewer counts in a turn than degrees are not a scale of a joint: drives have 1 / 1 if it was never set.
 const FEWEST: f64 = 360.0;
 /// The TOML's value may be rounded by this share of it.
 const ROUNDING: f64 = 1e-4;
@@ -33,7 +33,7 @@ fn quotient(drive: &Dcf, index: u16, node: u8) -> Option<Turn> {
     (above > 0 && below > 0).then(|| Turn { counts: above as f64 / below as f64, source })
 }
 
-/// What the drive's file says.
+/// Counts of a turn from the drive's file.
 fn turn(drive: &Dcf, node: u8) -> Option<Turn> {
     if let Some(feed) = quotient(drive, FEED, node) {
         return Some(feed);
@@ -48,7 +48,7 @@ fn turn(drive: &Dcf, node: u8) -> Option<Turn> {
     })
 }
 
-/// Counts in a degree of a joint, and what is to be reported about them.
+/// Counts in a degree of a joint, and notes about them.
 ///
 /// # Errors
 /// If neither file gives a scale, or it cannot be that of a joint.

@@ -59,7 +59,7 @@ impl Flags {
     }
 }
 
-/// What an adapter says.
+/// A line from an adapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Line {
     Frame(Frame),
@@ -221,7 +221,7 @@ mod tests {
         assert_eq!(found, [Line::Other, Line::Frame(Frame::from_raw(0x123, &[]).unwrap())]);
     }
 
-    /// Noise out of letters that lines have: what is taken for a frame is written as that frame.
+    /// Noise out of letters that lines have: a line that is accepted as a frame is written as that frame.
     #[test]
     fn random_lines_are_read_or_left() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);

@@ -100,7 +100,7 @@ pub(crate) struct Excite {
     /// Share of range, velocity, acceleration and torque that stays unused.
     #[arg(long, default_value_t = 0.05)]
     margin: f64,
-    /// What is optimised.
+    /// Criterion of the optimisation.
     #[arg(long, value_enum, default_value = "condition")]
     objective: Goal,
     /// Weight of 1/σ_min against the condition number.

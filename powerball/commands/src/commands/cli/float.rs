@@ -182,7 +182,8 @@ fn read_push(file: &Path) -> Result<Motion, Failure> {
     Ok(path)
 }
 
-/// What the hand felt while it pulled: its torque, and what friction and inertia alone would have taken, N·m rms by joint.
+/// The load of the hand while it pulled: its torque, and the torque of friction and inertia alone, N·m rms by
+/// joint.
 fn guided(model: &ModelArm, log: &[HandSample], until: f64) -> Value {
     let held: Vec<&HandSample> = log.iter().filter(|s| s.t < until).collect();
     if held.is_empty() {

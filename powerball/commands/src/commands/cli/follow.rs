@@ -91,7 +91,7 @@ struct Entry {
     contact: Option<ContactDetector<f64, 6>>,
 }
 
-/// What the page of --serve shows of a run.
+/// The signals of a run on the page of --serve.
 const FIELDS: [(&str, &str); 6] = [
     ("error", "mrad"),
     ("external_torque", "N·m"),
@@ -225,7 +225,7 @@ impl FollowCommand {
         })
     }
 
-    /// Of the feedback, where this program closes the loop, rad/s.
+    /// Bandwidth of the feedback, if this program closes the loop, rad/s.
     fn bandwidth(&self) -> Option<f64> {
         match self.with {
             With::Feedforward => None,
@@ -242,7 +242,7 @@ impl FollowCommand {
         Ok((*law != Law::Feedforward).then_some(pole))
     }
 
-    /// What is to be driven, in order.
+    /// The runs, in order.
     fn entries(&self, arm: &dyngen::Arm, model: ModelArm, path: &Path<6>) -> Result<Vec<Entry>, Failure> {
         let mut entries = Vec::new();
         let read =

@@ -107,13 +107,13 @@ async fn converse(stream: TcpStream, page: &Page) {
         .max_buf_size(REQUEST)
         .serve_connection(Line { stream, stalled: None }, service);
     let mut connection = pin!(connection);
-    // What goes wrong on a connection is its reader's loss.
+    // An error on a connection affects only its reader.
     if timeout(PATIENCE, connection.as_mut()).await.is_err() && asked.get() {
         let _ = connection.await;
     }
 }
 
-/// What is there to see, and for whom.
+/// The page, and who may see it.
 struct Page {
     hosts: Vec<String>,
     query: String,
@@ -191,7 +191,7 @@ struct History {
 impl History {
     fn push(&mut self, message: Bytes) {
         if self.messages.len() >= MOST {
-            // What began it all stays.
+            // The first message stays.
             self.dropped += self.messages.drain(1..MOST / 10).count();
         }
         self.messages.push(message);
@@ -213,7 +213,7 @@ struct Feed {
     next: usize,
 }
 
-/// What an answer brings.
+/// An answer of the server.
 enum Answer {
     Text(Option<Bytes>),
     Events(Feed),

@@ -55,7 +55,7 @@ enum Target {
     Csv,
 }
 
-/// What was found.
+/// The result of the command.
 #[derive(Serialize)]
 struct Written {
     files: Vec<Inspected>,

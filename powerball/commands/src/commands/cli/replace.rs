@@ -9,7 +9,7 @@ use serde_json::Value;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What `--force` says to this process.
+/// Whether `--force` was given to this process.
 static FORCE: AtomicBool = AtomicBool::new(false);
 
 /// Lets every file be replaced.
@@ -44,7 +44,7 @@ pub(super) fn check(target: &Path, new: Option<&[u8]>) -> Result<(), Failure> {
     if FORCE.load(Ordering::Relaxed) || !target.is_file() {
         return Ok(());
     }
-    // What cannot be read says so when it is written.
+    // A file that cannot be read gives an error when it is written.
     let Ok(old) = std::fs::read(target) else { return Ok(()) };
     match old.is_empty() || is_alike(target, &old, new) {
         true => Ok(()),

@@ -46,7 +46,7 @@ pub(crate) struct Summarize {
     accept: output::Accept,
 }
 
-/// What was written.
+/// The result of the command.
 #[derive(Serialize)]
 struct Written {
     arm: String,

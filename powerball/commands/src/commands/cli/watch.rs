@@ -316,10 +316,10 @@ fn lines(mut input: impl BufRead) -> impl Iterator<Item = std::io::Result<String
     })
 }
 
-/// With a larger share of samples whose time does not rise a stream is not judged.
+/// A stream with a larger share of samples whose time does not increase is not judged.
 const MOST_STALE: f64 = 0.05;
 
-/// What was watched.
+/// The part of the logs that was watched.
 #[derive(Default)]
 struct Seen {
     samples: usize,
@@ -340,7 +340,7 @@ impl Seen {
         self.last = Some(t);
     }
 
-    /// What was seen in another log as well.
+    /// Adds the result of another log.
     fn add(&mut self, other: Seen) {
         self.samples += other.samples;
         self.stale += other.stale;

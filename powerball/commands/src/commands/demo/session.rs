@@ -125,7 +125,7 @@ impl Session {
         }
     }
 
-    /// As [`Self::record`], along the paths of one attempt.
+    /// Like [`Self::record`], along the paths of one attempt.
     fn record_along(folder: &Path, seed: u64, attempt: u64, named: &[&str]) -> Result<Session, SessionError> {
         let arm_file = folder.join("arm.toml");
         save(&arm_file, lwa4p::ARM_FILE)?;
@@ -197,7 +197,7 @@ impl Session {
     }
 }
 
-/// Where a motion begins and ends.
+/// The first and the last position of a motion.
 fn ends(motion: &Motion) -> [[f64; 6]; 2] {
     let at = |place: usize| std::array::from_fn(|i| motion.q.get(place + i).copied().unwrap_or(0.0));
     [at(0), at(motion.q.len().saturating_sub(6))]

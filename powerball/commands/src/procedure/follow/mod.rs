@@ -257,7 +257,7 @@ impl<M: ArmModel<f64, N>, const N: usize> Run<'_, M, N> {
             };
             let losses = self.parts.map_or_else(SVector::zeros, |parts| parts.losses(k as f64 - 0.5));
             let external = observer.advance(self.arm, &measured.state, &(measured.acted - losses), period);
-            // What was carried on is no measurement.
+            // An extrapolated state is not a measurement.
             if let (Some(detector), Some(parts), false) = (&mut detector, self.parts, measured.is_carried_on)
             {
                 let rigid = between(&parts.rigid, k as f64);

@@ -4,12 +4,12 @@
 use super::path::{Parts, between};
 use nalgebra::{SMatrix, SVector};
 
-/// Of the torques by the best model that is known, this much may be wrong: rigid arm and effects, here and
-/// now; and of each joint's torque.
+/// Assumed error of the torques by the best known model: share of the rigid arm and the effects at this
+/// instant, and of each joint's torque.
 const RIGID: f64 = 0.05;
 const EFFECTS: f64 = 0.25;
 const OF_LIMIT: f64 = 0.01;
-/// Of the greatest friction on the path: a joint that came to rest stays where that holds it.
+/// Share of the greatest friction on the path: it can hold a joint that came to rest.
 const FRICTION: f64 = 0.3;
 /// The error of a joint follows the torque that is missing with the loop's time constant: this number of cycles counts, before and
 /// after.

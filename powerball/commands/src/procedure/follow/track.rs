@@ -45,7 +45,7 @@ pub struct Touched {
     pub link: usize,
 }
 
-/// By how much a track is off its path.
+/// The error of a track relative to its path.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TrackingError {
     /// By joint, rad.

@@ -69,7 +69,8 @@ pub(crate) fn compare(
         })
         .collect();
     let explained = explained(screen, &groups[chosen], joints);
-    // What a repeated path cannot judge fits any misfit there: that it fits this one says nothing.
+    // An effect that a repeated path cannot judge fits any error there: that it fits this one is not
+    // evidence.
     let close = (others.iter().take_while(|(_, score)| own / score < rule.least_margin))
         .filter(|(f, _)| groups[*f].judged_on(joints));
     let other = close
@@ -120,7 +121,8 @@ fn share_within(screen: &Screen<'_>, group: &Group, windows: &[Window]) -> f64 {
     if all > 0.0 { (inside / all).clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// What a group's members on the given joints explain of each joint's residual, in standard deviations.
+/// The part of each joint's residual that a group's members on the given joints explain, in standard
+/// deviations.
 fn explained(screen: &Screen<'_>, group: &Group, joints: &[JointNumber]) -> Signals {
     let mut sum = Signals::zeros(screen.context.data);
     for member in group.on(joints) {

@@ -16,7 +16,7 @@ use powerball_logs::regression::{Column, Data, Signals};
 /// Names for the same residual that the logs do not tell apart, the preferred one first.
 #[derive(Debug)]
 pub struct Open {
-    /// At least two.
+    /// At least two hypotheses.
     pub hypotheses: Vec<Hypothesis>,
 }
 

@@ -67,7 +67,7 @@ fn take_back(
 ) -> Option<Withheld> {
     let step = taken.first()?.step();
     let effect = taken.first()?.effect();
-    // What was found after it on the same joints may be there because of it, and is tried again.
+    // Effects that were found after it on the same joints may be there because of it, and are tried again.
     let joints: Vec<JointNumber> = taken.iter().flat_map(|a| a.candidate.joints.clone()).collect();
     model.accepted.retain(|a| a.step() <= step || !a.candidate.is_on(&joints));
     model.given_up.extend(taken.into_iter().map(|a| a.candidate));
@@ -151,7 +151,7 @@ pub(crate) fn leftover(before: &[f64], after: &[f64], floor: &[f64], joints: &[J
 /// standard error of that.
 type ByOctave = [(f64, f64); OCTAVES];
 
-/// What a signal holds by octave. An odd end is left out: by itself it tells fast from slow no more.
+/// The parts of a signal by octave. An odd end is left out: alone it does not distinguish fast from slow.
 fn octaves(signal: &[f64]) -> [Vec<f64>; OCTAVES] {
     let mut slower = signal.to_vec();
     std::array::from_fn(|octave| {

@@ -26,7 +26,7 @@ pub(crate) struct Composed {
     pub(crate) held_out: Signals,
 }
 
-/// What the accepted effects are.
+/// The parts of a model from the accepted effects.
 #[derive(Default)]
 struct Parts {
     /// In a model of the arm.
@@ -105,7 +105,7 @@ fn parts(study: &Study<'_>, found: &Model, validation_only: &[ValidationOnlyEffe
     parts.additions.payloads.extend(of_held);
     let (errors, places) = (found.errors(), found.places());
     for (k, (a, coefficients)) in found.accepted.iter().zip(found.coefficients()).enumerate() {
-        // What was measured above the band has no column.
+        // A ripple that was measured above the band has no column.
         let error = |c: usize| errors(places[k].start + c).filter(|_| a.above_band().is_none());
         let (effect, candidate) = (a.effect(), &a.candidate);
         let add = |to: &mut [f64], by: f64| candidate.joints.iter().for_each(|j| to[j.index()] += by);

@@ -145,7 +145,7 @@ fn named_effect(
         p_value: own().map(|(a, ..)| a.p_value).fold(0.0, f64::max),
         held_out_gain: own().map(|(a, ..)| a.fold_gain).collect(),
         logs,
-        // What is left is known only when all names are.
+        // The remaining error is known only when all names are.
         probability: f64::NAN,
         margin: first.comparison.margin,
         leftover: left(&joints),
@@ -156,7 +156,7 @@ fn named_effect(
     })
 }
 
-/// What is named is no rival of another name on the same joint.
+/// A named effect is not a rival of another name on the same joint.
 fn not_named_elsewhere(named: &mut [NamedEffect]) {
     let given = named.to_vec();
     for NamedEffect { rivals, joints, .. } in named {
@@ -240,7 +240,7 @@ fn changes(data: &Data<'_>, before: &[Vec<f64>], after: &[Vec<f64>]) -> Vec<Chan
     (0..data.dof()).filter(|j| !data.joints[*j].is_empty()).map(of).collect()
 }
 
-// What these logs cannot show, and what to record instead.
+// Effects that these logs cannot show, and what to record instead.
 
 /// Warning if each joint was fitted by itself.
 const PER_JOINT: &str = "the logs repeat one path, and separate models of the joints predict the held-out \
@@ -264,7 +264,7 @@ pub(crate) fn warnings(findings: &Findings<'_>) -> Vec<String> {
             warnings.push(note.clone());
         }
     }
-    // What is known beforehand of an arm is no measurement.
+    // Prior knowledge of an arm is not a measurement.
     let measured = fit.gram.all(&fit.weights).solver(|c| fit.free[c]);
     let is_seen =
         |c: usize| measured.kept().iter().any(|k| *k < fit.design.inertial && k % fit.design.set == c);

@@ -40,7 +40,7 @@ pub(super) fn explainable(study: &Study<'_>, fitted: &Signals, held_out: &Signal
     })
 }
 
-/// What is left of one joint, with the joints' states.
+/// The residual of one joint, with the joints' states.
 struct Rows {
     /// By state and row, in standard deviations of the fitted logs; those of the joint itself come first.
     states: Vec<Vec<f64>>,

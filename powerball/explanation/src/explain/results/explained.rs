@@ -123,7 +123,7 @@ pub struct Change {
     pub interval: [f64; 2],
 }
 
-// What is reported about an experiment that tells names apart.
+// The report on an experiment that distinguishes names.
 
 /// The recording that would distinguish the names that logs leave open.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -229,7 +229,7 @@ pub struct Shown {
 const MEANS: usize = 24;
 /// Joints shown of an effect that acts on several.
 const JOINTS: usize = 2;
-/// What builds up over a way is seen within this many times the way.
+/// An effect that builds up over a distance is seen within this many times the distance.
 const WAYS: f64 = 10.0;
 /// Steps of the encoders look like turning back; a joint turns back when it has come this far the other way,
 /// rad or m.

@@ -35,16 +35,16 @@ pub struct Difference {
     pub effect: String,
     /// The joints that it acts on.
     pub joints: Vec<JointNumber>,
-    /// From when on, in the log's own t, s.
+    /// Start time, in the log's own t, s.
     pub start_time: f64,
     /// Until when, s.
     pub end_time: f64,
     /// The share of the log's squared error, beyond that of the other logs, that goes with it; of a push on an arm that
     /// stands still, whose rows are in no error, the share of its torques that one force explains.
     pub share: f64,
-    /// By how much it is another one than in the other logs: friction (`temperature`) and gains (`torque_constant`)
-    /// relative, a zero of torques (`asymmetry`) in N·m or N, one of positions (`encoder_offset`) in rad or m, a delay
-    /// in s. Not of a body or a push, whose figures are in the effect.
+    /// Size of the difference from the other logs: friction (`temperature`) and gains (`torque_constant`)
+    /// relative, a zero of torques (`asymmetry`) in N·m or N, one of positions (`encoder_offset`) in rad or
+    /// m, a delay in s. `None` for a body or a push, whose figures are in the effect.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
 }
@@ -57,7 +57,7 @@ struct Local {
     torque: [Signals; 2],
 }
 
-/// What a log's rows say, mean over joints of squared errors over the joint's variance.
+/// The judgement by a log's rows: mean over joints of squared errors over the joint's variance.
 struct Judged<'a> {
     data: &'a Data<'a>,
     side: usize,

@@ -27,7 +27,7 @@ pub struct Unattributed {
     pub considered: Vec<Rival>,
 }
 
-/// The joints of which more than little is left that depends on something, and what is to be reported about
+/// The joints with more than a small remaining error that depends on a signal, and the notes about
 /// the others on which more than noise is left.
 pub(crate) fn unattributed(
     study: &Study<'_>,

@@ -109,7 +109,7 @@ pub(super) fn needs_no_name(study: &Study<'_>, after: &ResidualStats, floor: &[f
     !study.validation.joints[j].is_empty() && (little || is_at_noise_floor(study, after.rms[j], floor[j]))
 }
 
-/// What to think of and to do where much is left.
+/// Likely causes and advice for a joint with a large remaining error.
 fn advice(study: &Study<'_>, j: usize, left: f64, over_noise: f64, dependencies: &Dependencies) -> String {
     let mut parts: Vec<String> = Vec::new();
     if left > study.rule().nothing_share {
@@ -141,7 +141,7 @@ fn advice(study: &Study<'_>, j: usize, left: f64, over_noise: f64, dependencies:
     parts.join("; ")
 }
 
-/// What makes a torque that depends on a signal, most of all.
+/// The most likely cause of a torque that depends on a signal.
 fn kind(signals: &[(String, f64)], j: usize) -> String {
     let Some((name, _)) = signals.first() else { return String::new() };
     let split = name.find(|c: char| c.is_ascii_digit()).unwrap_or(name.len());
@@ -165,7 +165,7 @@ fn kind(signals: &[(String, f64)], j: usize) -> String {
 
 // Whether an explanation contradicts itself: tests ask it of measured logs, and the study of every case.
 
-/// In what an explanation contradicts itself, in words; empty where it does not.
+/// The contradictions of an explanation, in words; empty if there are none.
 ///
 /// * Probabilities lie between 0 and 1.
 /// * No name is given and refused on one joint.
@@ -291,7 +291,7 @@ impl Evidence {
     }
 }
 
-/// What is no number counts as the lower end, which `clamp` would keep.
+/// NaN counts as the lower end; `clamp` would keep it.
 #[allow(clippy::manual_clamp)]
 fn within(x: f64, [low, high]: [f64; 2]) -> f64 {
     x.max(low).min(high)

@@ -35,7 +35,7 @@ pub(crate) struct CrossValidated {
     pub(crate) p_value: f64,
     /// The correlation of what either way adds.
     pub(crate) correlation: f64,
-    /// By how much the logarithm of the squared error changes on the logs, mean over joints.
+    /// Change of the logarithm of the squared error on the logs, mean over joints.
     pub(crate) log_change: f64,
 }
 

@@ -64,7 +64,7 @@ fn more_than_needed(study: &Study<'_>, model: &Model) -> Option<(usize, Candidat
 fn weakest(study: &Study<'_>, model: &Model) -> Option<usize> {
     let rule = study.rule();
     let mut weakest: Option<(usize, f64)> = None;
-    // What is in the model from the start stays until everything else is known.
+    // Effects that are in the model from the start stay until everything else is known.
     let found = model.accepted.iter().enumerate().zip(gains(model)).filter(|((_, a), _)| !a.is_baseline());
     for ((k, a), gain) in found {
         let score = gain - penalty(rule, a.columns(), a.candidate.searched);
@@ -81,7 +81,7 @@ pub(crate) fn gains(model: &Model) -> Vec<f64> {
     falls(model, &columns)
 }
 
-/// As [`gains`], for sets of columns.
+/// Like [`gains`], for sets of columns.
 fn falls(model: &Model, sets: &[Vec<usize>]) -> Vec<f64> {
     let normal = model.fit.normal_equations();
     let error = |without: &dyn Fn(usize) -> bool| {
@@ -92,7 +92,7 @@ fn falls(model: &Model, sets: &[Vec<usize>]) -> Vec<f64> {
     sets.iter().map(|columns| error(&|c| columns.contains(&c)) - full).collect()
 }
 
-// What is in the model from the start: which of it is needed once everything else is known.
+// Effects that are in the model from the start: which of them are needed once everything else is known.
 
 /// The evidence for a part of the model, with everything else refitted.
 struct Needed {
@@ -221,7 +221,8 @@ pub(crate) fn refine(study: &Study<'_>, model: &mut Model) {
     }
 }
 
-/// Where an accepted effect fits better, with its trial there. `own` are the places of its columns.
+/// The settings with which an accepted effect fits better, with its trial there. `own` are the places of its
+/// columns.
 fn moved(
     study: &Study<'_>,
     model: &Model,
@@ -244,8 +245,8 @@ fn moved(
         let mut others: Vec<Candidate> = moved_ends(&candidate.windows, fitted, share)
             .map(|windows| Candidate { windows, ..candidate.clone() })
             .collect();
-        // What takes its setting from its own coefficient, or lies in some logs, is where it belongs
-        // but for its ends.
+        // An effect that takes its setting from its own coefficient, or that lies in some logs, needs no
+        // other setting, except for its ends.
         if !refines && candidate.windows.is_empty() {
             others.extend(other_settings(&context, &candidate, share));
         }

@@ -42,9 +42,9 @@ impl Evidence {
 /// The extent in which a candidate acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Extent {
-    /// In all logs.
+    /// The candidate acts in all logs.
     Everywhere,
-    /// In some logs, for most of their time.
+    /// The candidate acts in some logs, for most of their time.
     SomeLogs,
     /// For this long, s: too short for blocks and folds.
     Short(f64),
@@ -248,7 +248,7 @@ fn mean_square(x: &[f64]) -> f64 {
     dot(x, x) / x.len().max(1) as f64
 }
 
-/// What a trial adds to the prediction on the validation set, by joint and row, N·m.
+/// The addition of a trial to the prediction on the validation set, by joint and row, N·m.
 fn added(
     screen: &Screen<'_>,
     trial: &Trial,
@@ -360,7 +360,7 @@ pub(crate) fn refusal(rule: &Rule, evidence: &Evidence, tests: f64, local: bool)
             false => "its time has no larger error than others".to_string(),
         });
     }
-    // What happens in some logs only need not happen in the validation set.
+    // An effect in some logs only need not be in the validation set.
     if evidence.validation_gain <= 0.0 && !local {
         return Some(format!(
             "does not lower the error on the other path ({:+.1} %)",

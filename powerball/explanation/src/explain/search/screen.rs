@@ -220,13 +220,13 @@ pub(crate) fn fold_gains(
         .collect()
 }
 
-/// By how much the held squared error falls.
+/// The fall of the held-out squared error.
 fn change(fold: &FoldBase, fitted: &Added, held: &Added) -> f64 {
     let (base, rest) = fitted.without_base(&fold.solver);
     let right: Vec<f64> =
         fitted.right.iter().zip(&fitted.cross).map(|(own, cross)| own - dot(cross, &fold.theta)).collect();
     let x = fitted.solver(&rest).solve(&right);
-    // What the candidate adds to the prediction: C x − A s.
+    // The addition of the candidate to the prediction: C x − A s.
     let mut shift = vec![0.0; fold.theta.len()];
     for (b, x) in base.iter().zip(&x) {
         shift.iter_mut().zip(b).for_each(|(s, b)| *s += x * b);

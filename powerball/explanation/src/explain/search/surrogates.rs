@@ -41,7 +41,7 @@ pub(crate) fn level_by_chance(screen: &Screen<'_>, trials: &[&Trial], short: boo
     exceeded(draws.into_iter().flatten().map(|s| s.score).collect(), share)
 }
 
-/// What a share of some scores stays below.
+/// The score below which a share of some scores stays.
 fn exceeded(mut scores: Vec<f64>, share: f64) -> f64 {
     scores.sort_by(f64::total_cmp);
     scores.get((scores.len() as f64 * share) as usize).copied().unwrap_or(0.0)
@@ -130,7 +130,7 @@ pub(crate) fn false_positives(study: &Study<'_>, model: &Model) -> FalsePositive
     let drawn: Vec<&Trial> = trials.iter().map(|(trial, _)| *trial).collect();
     let draws = draw(&screen, &drawn, rule.final_surrogates, FINAL_SEED);
     let found: Vec<&Surrogate> = draws.iter().flatten().collect();
-    // What scores too little is refused by that alone.
+    // A candidate that scores too little is refused by that alone.
     let high: Vec<&Surrogate> = found.iter().copied().filter(|s| s.score >= rule.least_score).collect();
     let accepted = parallel::map(&high, |surrogate| accepts(surrogate)).into_iter().filter(|a| *a).count();
     let surrogates = found.len();
@@ -171,7 +171,7 @@ fn rotated(values: &[f64], recordings: &[Range<usize>], shift: &Shift) -> Vec<f6
 /// How columns are changed into some that cannot be true.
 #[derive(Clone, Debug)]
 pub(super) struct Shift {
-    /// By this share of each recording.
+    /// Shift as a share of each recording.
     pub(super) fraction: f64,
     /// By recording, 1 or −1.
     pub(super) signs: Vec<f64>,
@@ -235,7 +235,7 @@ fn likeness(column: &Column, joints: &[JointRows], shifts: &[Shift]) -> Vec<Like
     }
     let changes = about_mean > 1e-6 * 2.0 * size;
     let of = |(cross, turned): (f64, f64)| Likeness {
-        // What hardly changes is the same wherever it is shifted to.
+        // A signal that hardly changes is the same after any shift.
         correlation: if changes { cross / about_mean } else { 1.0 },
         cosine: turned / size,
     };

@@ -44,7 +44,7 @@ pub(crate) struct RestPush {
 const GUARD: f64 = 0.25;
 /// A push lasts at least so long, s; what is interrupted for less is one push.
 const SHORTEST: f64 = 0.2;
-/// What a residual at rest may be is taken from the rests of other logs where they last so long together, s …
+/// The range of a residual at rest is taken from the rests of other logs if they last this long together, s …
 const ENOUGH_REST: f64 = 5.0;
 /// … as the value that this share of them does not exceed …
 const USUAL: f64 = 0.995;
@@ -62,7 +62,8 @@ const BRAKED: f64 = 0.5;
 /// link's origin explains this share more than the tool.
 const EXPLAINED: f64 = 0.5;
 const OTHER_LINK: f64 = 0.2;
-/// What is there for this share of the rests of a log, of which there are several, is carried, and no push.
+/// A force during this share of the rests of a log, of which there are several, is that of a carried body,
+/// not a push.
 const CARRIED: f64 = 0.9;
 /// Rounds in which what pushes is taken out of what is usual.
 const ROUNDS: usize = 2;
@@ -127,7 +128,7 @@ fn pushed(
     rests.chunk_by(|a, b| a.recording.log == b.recording.log).map(of).collect()
 }
 
-/// What a joint's torque may be off by where nothing touches the arm, N·m.
+/// The usual error of a joint's torque without contact, N·m.
 struct Usual {
     /// Coulomb friction.
     friction: f64,

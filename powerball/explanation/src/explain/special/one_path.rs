@@ -132,7 +132,7 @@ pub(crate) fn choose_clock<'a>(
     best
 }
 
-/// What warmth explains of both sets of logs.
+/// The gain of warming on both sets of logs.
 fn gain(rule: &Rule, effect: &dyn Effect, data: &Data<'_>, fit: &Fit, other: &Data<'_>) -> f64 {
     let context = Context::new(data, fit, &fit.residual, rule);
     let screen = Screen::new(&context);

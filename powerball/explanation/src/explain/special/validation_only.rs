@@ -93,7 +93,7 @@ pub(crate) fn validation_only_effects<'a>(
     let folds = Folds::new(&together);
     let fit = fit(&together, &folds, &[], Some(base));
     let mut pooled = Pooled { data: together, folds, fit, seen: Vec::new() };
-    // What is in some fitted logs is found as well, so that it does not hide what is not.
+    // Effects in some fitted logs are found as well, so that they do not hide the others.
     while let Some(seen) = look(rule, &pooled).filter(|_| pooled.seen.len() < MOST) {
         pooled.take(rule, seen);
     }
@@ -125,7 +125,8 @@ pub(crate) fn validation_only_effects<'a>(
     let new = |seen: &&Seen| {
         let in_validation = seen.candidate.windows.iter().all(|w| validation.logs.contains(&w.log));
         let longest = seen.candidate.windows.iter().map(|w| w.to - w.from).fold(0.0, f64::max);
-        // What pushes for longer than a hand does may as well be what the base model lacks on a path of its own.
+        // A push that lasts longer than that of a hand may equally be an error of the base model on a new
+        // path.
         in_validation && (!short(seen) || (pushed && longest <= contact_wrench::LONGEST_PUSH))
     };
     let seen: Vec<&Seen> = pooled.seen.iter().filter(new).collect();
@@ -204,8 +205,7 @@ fn taken_out<'a>(
     Some((with_torques(rule, pooled, seen, named, torques), without))
 }
 
-/// What is reported about what was seen of an effect, with what is left on the validation set before and
-/// after.
+/// The report on an effect that was seen, with the residual on the validation set before and after.
 fn named(
     rule: &Rule,
     pooled: &Pooled<'_>,
@@ -250,7 +250,7 @@ fn named(
     }
 }
 
-/// What was seen of an effect as parts of a model, each with its torques.
+/// The parts of an effect that were seen, as parts of a model, each with its torques.
 fn with_torques(
     rule: &Rule,
     pooled: &Pooled<'_>,

@@ -1,4 +1,4 @@
-//! What python-canopen reads of the files in `tests/eds_data` is read equal here.
+//! The files in `tests/eds_data` are read as python-canopen reads them.
 
 use super::*;
 use serde_json::{Value as Json, json};

@@ -45,7 +45,7 @@ pub(super) enum About {
 pub(super) struct Section {
     pub(super) name: String,
     pub(super) line: usize,
-    /// By their names in lower case, with their lines.
+    /// The keys by their names in lower case, with their values and lines.
     pub(super) keys: BTreeMap<String, (usize, String)>,
 }
 
@@ -201,7 +201,7 @@ impl Section {
             return Err(DcfError { line: self.line, message });
         };
         let code = code as u16;
-        // What a type of the maker's own holds is not known here: bytes.
+        // The content of a maker's own type is not known here: bytes.
         Ok(if code > LAST_TYPE { types.get(&code).copied().unwrap_or(DOMAIN_TYPE) } else { code })
     }
 

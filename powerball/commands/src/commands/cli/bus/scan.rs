@@ -123,7 +123,7 @@ fn ask_all(
     Ok(frames.collect())
 }
 
-/// What a node refuses or does not say is left empty; a bus that fails is an error.
+/// A value that a node refuses or does not report is left empty; a bus that fails is an error.
 fn optional<T>(result: Result<T, TransferError>) -> Result<Option<T>, Failure> {
     match result {
         Ok(value) => Ok(Some(value)),

@@ -47,7 +47,7 @@ struct What {
     node: Vec<NodeId>,
 }
 
-/// What one drive says.
+/// The report of one drive.
 struct Row {
     node: NodeId,
     status: Statusword,
@@ -102,7 +102,7 @@ fn row(bus: &mut dyn Bus, node: NodeId) -> Result<Row, blocking::TransferError> 
     let mut signed = |object: Object| ask(object).map(|v| v.signed().unwrap_or(0));
     let counts = [signed(drive::POSITION)?, signed(drive::VELOCITY)?, signed(drive::TORQUE)?];
     let known = LWA4P.joints.iter().find(|joint| joint.node == node).unwrap_or(&LWA4P.joints[0]).units;
-    // What not every drive has does not make it silent.
+    // A missing object that not every drive has does not make it silent.
     let extended = signed(schunk::EXTENDED_STATUS).unwrap_or(i32::from(schunk::COMMUTATED));
     let history = signed(objects::ERROR_HISTORY).unwrap_or(0);
     let error =
