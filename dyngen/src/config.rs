@@ -80,7 +80,7 @@ pub enum GenerateError {
     Arm(Diagnostics),
     /// The arm's model is not to be had.
     Model(Error),
-    /// The language does not have what was asked for.
+    /// The language does not have the requested item.
     Language(String),
     /// A file could not be written, or the build script's environment is not there.
     Write(PathBuf, std::io::Error),
@@ -270,7 +270,7 @@ impl Config {
         Ok(())
     }
 
-    /// From a build script: writes `name` into `OUT_DIR` and tells cargo when to run again.
+    /// For a build script: writes `name` into `OUT_DIR`, and sets when cargo runs it again.
     ///
     /// # Errors
     /// As [`Config::write`].

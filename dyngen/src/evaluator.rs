@@ -123,7 +123,7 @@ impl Evaluator {
     /// Runs over samples that lie one after another; `out` takes [`Evaluator::outputs`] numbers a sample.
     ///
     /// # Panics
-    /// Where a slice that the function takes has another length than `out` asks for.
+    /// If a slice that the function takes has another length than `out` needs.
     pub fn run(&self, samples: &Samples<'_>, out: &mut [f64]) {
         let (n, width) = (self.dof, self.outputs());
         let count = out.len() / width.max(1);
@@ -146,7 +146,7 @@ impl Evaluator {
                     *x = from[at(lane) * length + i];
                 }
             };
-            // An angle's sine and cosine are asked for one after the other.
+            // An angle's sine and cosine are requested one after the other.
             let mut last: Option<(JointSum, [Lane; 2])> = None;
             let mut sin_cos = |sum: JointSum| {
                 let known = last.filter(|(of, _)| *of == sum);
@@ -188,7 +188,7 @@ impl Evaluator {
         }
     }
 
-    /// What the function needs of the parameters alone.
+    /// The values of the function that depend on the parameters alone.
     fn prepared(&self, parameters: &[f64]) -> Vec<f64> {
         let mut values = vec![0.0; self.preparation.outputs()];
         let input = |input: Input, lane: &mut Lane| {

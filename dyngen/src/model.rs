@@ -25,7 +25,7 @@ pub struct Model {
     angles: Angles,
     symbols: AngleSymbols,
     sets: Sets,
-    /// For each kind of set the ways in which functions sum its parameters up, once they are asked for.
+    /// For each kind of set the ways in which functions sum its parameters up, once they are requested.
     regroupings: [OnceLock<Vec<Regrouping>>; 4],
 }
 

@@ -63,7 +63,8 @@ impl Values {
         let (mut by_name, mut wrong) = (BTreeMap::new(), Vec::new());
         let mut given: Vec<(&str, &Value)> = Vec::new();
         match object.get("parameters").and_then(Value::as_array) {
-            // What `powerball identify` and `explain` write; its other keys are not the rigid arm's.
+            // The form that `powerball identify` and `explain` write; its other keys do not belong to the
+            // rigid arm.
             Some(list) => {
                 let mut seen = BTreeSet::new();
                 for name in list.iter().filter_map(|entry| entry["name"].as_str()) {

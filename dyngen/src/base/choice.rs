@@ -89,7 +89,7 @@ impl AllColumns {
         }
     }
 
-    /// What some columns cost in a form: operations, and the additions among them.
+    /// The cost of some columns in a form: operations, and the additions among them.
     fn cost(&self, form: &FunctionGraph, kept: &[usize]) -> (usize, usize) {
         let (rows, columns) = form.shape;
         let outputs: Vec<Expr> = (kept.iter().filter_map(|k| self.place[*k]))

@@ -71,7 +71,7 @@ pub fn all_rows(
     chain.rows(&links)
 }
 
-/// What a link's own joint adds to the rows.
+/// The contribution of a link's own joint to the rows.
 struct Link<'a, 'f> {
     /// A basis of the values that its columns take under functionals that vanish on constants, in reduced
     /// form.

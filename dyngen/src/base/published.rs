@@ -91,7 +91,7 @@ fn lost(
         if at.is_some_and(|at| grouping.kept.contains(&at)) {
             continue;
         }
-        // What the sums put in the parameter's place; nothing where no sum names it.
+        // The replacement of the parameter in the sums; empty if no sum names it.
         let replacement: Vec<(Parameter, Constant)> = at
             .map(|at| {
                 grouping.coordinates[at].iter().map(|(p, c)| (order[grouping.kept[*p]], c.clone())).collect()

@@ -38,7 +38,7 @@ impl Class {
     }
 }
 
-/// Of the values of general angles modulo the prime; any fixed seed keeps the choice reproducible.
+/// Seed of the values of general angles modulo the prime; any fixed seed keeps the choice reproducible.
 const SEED: u64 = 0x6479_6e67_656e;
 
 /// All sets of an arm, in its field of constants.
@@ -69,7 +69,7 @@ impl Sets {
         let columns = arm.links() * 11;
         let eliminate_of = |arm: &Arm, rows: &[SparseRow], preference: Preference| {
             let order: Vec<usize> = preference.order(arm).iter().map(|p| p.index()).collect();
-            // What is found is certified by the Lagrangian itself below.
+            // The result is certified by the Lagrangian itself below.
             elimination::unchecked(&field, rows, columns, &order)
         };
         let eliminate = |rows: &[SparseRow], preference: Preference| eliminate_of(arm, rows, preference);

@@ -40,7 +40,7 @@ const A: usize = MOTION + 4;
 const D: usize = MOTION + 5;
 const RATIO: usize = MOTION + 6;
 const B: usize = MOTION + 7;
-/// Of the motion and the joint; those that coupled motors add to the motion follow.
+/// Number of variables of the motion and the joint; those that coupled motors add to the motion follow.
 const VARIABLES: usize = MOTION + 8;
 
 /// A functional's values on the monomials of a motion, or on a link's columns; zeros left out.
@@ -312,7 +312,7 @@ impl<'f> Steps<'f> {
         let one = self.field.rational(rational::integer(1));
         let before = listed(self.turned(joint, true));
         let own = |variable: usize| &before[variable - self.first];
-        // What each monomial is in the body's axes; those of coupled motors are expressed in no others.
+        // Each monomial in the body's axes; those of coupled motors are expressed in no others.
         let carried = self.pending.first().copied().unwrap_or(self.motion.len());
         let in_body: Vec<_> =
             self.motion[..carried].iter().map(|m| self.split(&image(&self.ring, m, &own))).collect();

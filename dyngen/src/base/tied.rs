@@ -155,7 +155,7 @@ impl<A: Algebra> Algebraic<'_, A> {
     }
 }
 
-/// What the Lagrangian requires of an arm, at a point.
+/// The quantities of an arm at a point that the Lagrangian needs.
 struct Quantities<'a, 'b, A: Algebra> {
     algebraic: &'a Algebraic<'b, A>,
     point: &'a Point,

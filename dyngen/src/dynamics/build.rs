@@ -147,9 +147,9 @@ pub fn build_in(
     FunctionGraph { function, graph, outputs, shape, joints, parameters, baked: baked.is_some() }
 }
 
-/// What functions are made of in one form, as expressions of one graph: the chain, its links' bodies and rates. All of
-/// it is of the chain, whose joints that follow others are links of it; what is linear in rates or torques becomes
-/// that of the coordinates at once, angles and positions when a function is done.
+/// The parts of functions in one form, as expressions of one graph: the chain, its links' bodies and rates.
+/// All of it is of the chain, whose joints that follow others are links of it; what is linear in rates or
+/// torques becomes that of the coordinates at once, angles and positions when a function is done.
 #[derive(Clone)]
 struct Parts<'a> {
     b: &'a Builder,
@@ -264,7 +264,7 @@ impl<'a> Parts<'a> {
                 let driven = self.twist(&self.each(Input::Acceleration));
                 driven.iter().zip(&self.jacobian_rate_times_velocity()).map(|(x, y)| b.add(x, y)).collect()
             }
-            // What differs from the functions without a payload are the bodies.
+            // Only the bodies differ from the functions without a payload.
             Function::InverseDynamicsWithPayload => self.torque(self.each(Input::Acceleration), true),
             Function::MassMatrixWithPayload => self.mass_matrix(),
             Function::CoriolisMatrixWithPayload => {
@@ -365,7 +365,7 @@ impl<'a> Parts<'a> {
         forward::solve_symmetric(b, &self.mass_matrix(), &right)
     }
 
-    /// Where frame 0 and the tool are.
+    /// The poses of frame 0 and the tool.
     fn ends(&self) -> pose::Ends {
         let b = self.b;
         let symbol = |index, sine| b.symbol(index, sine);

@@ -150,7 +150,7 @@ pub fn geometry<A: Algebra>(
     };
     let signed = |i: usize, v: &A::Value| if reversed[i] { alg.neg(v) } else { v.clone() };
     let is_revolute = |i: usize| arm.joints[i].kind == JointKind::Revolute;
-    // What is left of d along the own axis. A prismatic joint's shift comes before its frame.
+    // The remaining part of d along the own axis. A prismatic joint's shift comes before its frame.
     let rest = |i: usize| if is_revolute(i) && !slid[i] { signed(i, &joint(i).shift) } else { zero.clone() };
     (0..n)
         .map(|i| {

@@ -114,7 +114,7 @@ pub fn mass_matrix(b: &Builder, chain: &Chain, bodies: &[LinkBody]) -> Vec<Expr>
     matrix
 }
 
-/// What the joints feel of a moment about the z of a stage on the link before its k-th joint.
+/// The torques of the joints from a moment about the z of a stage on the link before its k-th joint.
 fn carried_by(b: &Builder, chain: &Chain, s: usize, k: usize, moment: Expr) -> Vec<Expr> {
     let mut felt = vec![Expr::ZERO; chain.dof()];
     let (stage, inner) = (&chain.stages[s], &chain.stages[..s]);
@@ -201,7 +201,7 @@ fn revolute(
             columns[l] = columns[l].shifted(b, &piece.reach);
         }
         if k + 1 < count {
-            // What is beyond moves along: its first moment times that velocity.
+            // The bodies beyond it move along: their first moment times that velocity.
             let [_, _, sz] = rest.first;
             for (i, p) in piece.reach.iter().take(2).enumerate() {
                 columns[k].moment[i] = b.sub(&columns[k].moment[i], &b.mul(&sz, p));

@@ -30,7 +30,7 @@ struct Moving {
     spread: [Vector; 3],
 }
 
-/// What a coordinate makes of the links that it moves, about an origin.
+/// The contribution of a coordinate from the links that it moves, about an origin.
 #[derive(Clone, Copy, Debug)]
 struct Share {
     /// Σ m J̇ and Σ r×m J̇: its column of C.
@@ -346,7 +346,7 @@ impl Moving {
         [-x, -y, b.add(&k[0][0], &k[1][1])]
     }
 
-    /// What a coordinate makes that turns all of it about z, or moves it along z.
+    /// The contribution of a coordinate that turns all of it about z, or moves it along z.
     fn share(&self, b: &Builder, kind: JointKind, z_rate: &Vector) -> Share {
         let s = &self.body.first;
         let row = unit_momentum(b, &self.body, kind);

@@ -41,7 +41,7 @@ struct Factors {
 impl Factors {
     fn of(b: &Builder, matrix: &[Expr], n: usize) -> Factors {
         let mut lower = vec![Expr::ZERO; n * n];
-        // What L is before the division by D, so that each term of a sum is one product.
+        // L before the division by D, so that each term of a sum is one product.
         let mut scaled = vec![Expr::ZERO; n * n];
         let mut inverse = vec![Expr::ZERO; n];
         for i in (0..n).rev() {

@@ -247,7 +247,7 @@ impl Function {
         all
     };
 
-    /// The functions that a file has unless others are asked for: what identification and most controllers
+    /// The functions that a file has unless others are requested: what identification and most controllers
     /// need.
     pub fn common() -> impl Iterator<Item = Function> {
         Self::ALL.into_iter().take_while(|f| *f <= TorqueByVelocity)

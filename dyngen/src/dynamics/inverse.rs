@@ -97,7 +97,7 @@ pub fn newton_euler(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: &Dri
     Passes { torques, motions, felt }
 }
 
-/// What each coordinate of the stage feels, and the wrench before the stage about its first origin.
+/// The force on each coordinate of the stage, and the wrench before the stage about its first origin.
 fn revolute(
     b: &Builder,
     chain: &Chain,
@@ -163,7 +163,7 @@ fn prismatic(
     (vec![Felt { torque: before.force[2], wrench: turned, later: super::body::ZERO }], before)
 }
 
-/// What a body's motion needs: f = m a + U s, n = Σ J_ij e_i×(U e_j) + s×a.
+/// The wrench of a body's motion: f = m a + U s, n = Σ J_ij e_i×(U e_j) + s×a.
 fn body_wrench(b: &Builder, body: &LinkBody, link: &LinkMotion) -> Wrench {
     let moments = &body.moments;
     let mut wrench = Wrench::NONE;

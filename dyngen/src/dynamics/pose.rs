@@ -112,7 +112,7 @@ pub fn forward_kinematics(b: &Builder, arm: &ArmElements<Expr>, ends: &Ends) -> 
 /// axes.
 pub fn jacobian(b: &Builder, arm: &ArmElements<Expr>, ends: &Ends) -> Vec<Expr> {
     let (joints, last) = poses(b, arm, ends);
-    // What comes behind the tool's link does not move it.
+    // Joints beyond the tool's link do not move it.
     let n = arm.joints.len();
     let mut rows = vec![Expr::ZERO; 6 * n];
     for (j, (pose, joint)) in joints.iter().zip(&arm.joints).enumerate() {

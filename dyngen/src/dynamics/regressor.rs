@@ -13,7 +13,7 @@ use crate::exact::constant::ConstantField;
 use crate::graph::{Builder, Expr};
 use crate::parameters::ParameterSet;
 
-/// What a unit of a coordinate's velocity gives a frame.
+/// The motion of a frame for a unit of a coordinate's velocity.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     /// Angular velocity.
@@ -22,7 +22,7 @@ struct Axis {
     linear: Vector,
 }
 
-/// Where a link's columns are projected.
+/// The view in which a link's columns are projected.
 #[derive(Clone, Debug)]
 struct LinkView {
     motion: LinkMotion,

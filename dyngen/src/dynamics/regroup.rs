@@ -123,7 +123,7 @@ pub struct Regrouping {
     columns: Vec<(Column, Vec<(usize, Constant)>)>,
 }
 
-/// Lengths and twists as constants; what depends on q is not asked for.
+/// Lengths and twists as constants; elements that depend on q are not requested.
 struct Constants<'a> {
     field: &'a ConstantField,
     arm: &'a Arm,
@@ -180,7 +180,7 @@ impl<'a> Map<'a> {
         Map { field, links: chain::geometry(field, arm, origins, &elements) }
     }
 
-    /// What a unit of a parameter of the file is in the link's frame.
+    /// The moments of a unit of a parameter of the file in the link's frame.
     fn of_parameter(&self, parameter: Parameter) -> Moments<Constant> {
         use ParameterKind::*;
         let f = self.field;
@@ -259,13 +259,13 @@ impl<'a> Map<'a> {
     }
 }
 
-/// What a link's body may take, whatever the set.
+/// The columns that a link's body may have, for any set.
 fn columns_of_link(link: usize) -> impl Iterator<Item = Column> {
     let entries = (0..ENTRIES).map(move |entry| Column::Entry(link, entry));
     entries.chain([Column::EndMass(link), Column::Rotor(link), Column::Flywheel(link)])
 }
 
-/// Of each link its stage, and the link before that.
+/// The stage of each link, and the link before that stage.
 fn stages_of_links(arm: &Arm) -> (Vec<usize>, Vec<Option<usize>>) {
     let stages = chain::stages(arm).into_iter().enumerate();
     stages.flat_map(|(s, stage)| stage.clone().map(move |_| (s, stage.start.checked_sub(1)))).unzip()

@@ -103,7 +103,8 @@ impl Chain {
             stages.last_mut().filter(|s| form.last_in_frame_before && s.kind == JointKind::Revolute)
             && let Some(member) = last.members.last_mut()
         {
-            // What is turned back to the frame before the stage has to come from there to the others.
+            // Vectors that are turned back to the frame before the stage must be passed from there to the
+            // others.
             last_turn = std::mem::replace(&mut member.angle, STRAIGHT);
             member.reach = back_z(b, last_turn, &member.reach);
             if let [.., before, member] = &mut last.members[..] {

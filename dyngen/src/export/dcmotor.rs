@@ -10,8 +10,8 @@ use super::term::{Law, Term};
 use crate::arm::JointKind;
 use std::f64::consts::FRAC_PI_2;
 
-/// What LuGre's bristles give way before they slide, rad and m, where no log says it: far below what an encoder's
-/// user sees, far above what a simulation's step of 2 ms cannot follow.
+/// Deflection of LuGre's bristles before they slide, rad and m, if no log gives it: far below what an
+/// encoder's user sees, far above what a simulation's step of 2 ms cannot follow.
 const BRISTLES: [f64; 2] = [1e-3, 1e-4];
 
 /// The effects of one joint.

@@ -89,7 +89,8 @@ fn held(arm: &Arm, known: &Known, i: usize) -> (Held, Motors) {
     (Held { friction, armature, spring: effects.spring.take() }, effects)
 }
 
-/// What a joint holds in addition to its range, or the tendon of a motor that turns with several joints.
+/// The values of a joint in addition to its range, or of the tendon of a motor that turns with several
+/// joints.
 struct Held {
     friction: Option<Friction>,
     armature: Option<f64>,
@@ -97,7 +98,7 @@ struct Held {
 }
 
 impl Held {
-    /// What is left on the joint where a tendon holds this.
+    /// The values that stay at the joint if a tendon holds these.
     fn moved_away(&self) -> Held {
         Held {
             friction: self.friction.map(|_| Friction { viscous: Some(0.0), coulomb: 0.0, std: [None; 2] }),
@@ -165,7 +166,7 @@ fn errors(friction: &Friction) -> String {
     format!("standard errors: damping {}, frictionloss {}", error(0), error(1))
 }
 
-/// What the names of actuators begin with that an export writes, and the next one replaces.
+/// Prefix of the names of actuators that an export writes, and that the next one replaces.
 const OURS: &str = "dyngen ";
 
 struct Writer<'t, 'd> {
@@ -231,7 +232,7 @@ impl<'t, 'd> Writer<'t, 'd> {
         }
     }
 
-    /// What a joint of the chain holds, and its range where that is another one now.
+    /// Writes the values of a joint of the chain, and its range if it has changed.
     fn joint(&mut self, old: &ChainJoint, joint: &Joint, held: &Held) {
         let Some(node) = self.joint_element(&old.name) else { return };
         if let Some(friction) = &held.friction {

@@ -58,7 +58,7 @@ pub(super) fn shares(
     .collect()
 }
 
-/// What is fixed to the first link keeps its own inertia, where that leaves the first one a body's.
+/// A link that is fixed to the first one keeps its own inertia, if the rest is possible for the first one.
 fn share(
     joint: &ChainJoint,
     body: &Body,
@@ -102,7 +102,7 @@ fn own(robot: &Robot, name: &str, pose: &Pose) -> Body {
     })
 }
 
-/// Of all joints, those that follow others too.
+/// The names of all joints, including those that follow others.
 fn all_names(arm: &Arm) -> Vec<String> {
     let name = |(i, joint): (usize, &Joint)| joint.name.clone().unwrap_or_else(|| (i + 1).to_string());
     arm.joints.iter().enumerate().map(name).collect()

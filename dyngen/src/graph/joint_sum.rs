@@ -15,8 +15,8 @@ impl JointSum {
         JointSum { plus: 1 << joint, minus: 0 }
     }
 
-    /// A sum of joints, each with its sign (`true`: minus), and whether the sum is minus what was asked for:
-    /// the first joint's sign is plus.
+    /// A sum of joints, each with its sign (`true`: minus), and whether the sum is the negative of the
+    /// requested one: the first joint's sign is plus.
     pub fn of(joints: impl IntoIterator<Item = (usize, bool)>) -> (JointSum, bool) {
         let mut sum = JointSum { plus: 0, minus: 0 };
         for (joint, negative) in joints {
@@ -59,7 +59,7 @@ impl JointSum {
 }
 
 impl fmt::Display for JointSum {
-    /// As part of a name: `2`, `2m3` for q2 − q3, `2p3` for q2 + q3.
+    /// The sum as part of a name: `2`, `2m3` for q2 − q3, `2p3` for q2 + q3.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (k, (joint, negative)) in self.joints().enumerate() {
             let sign = if k == 0 {

@@ -20,7 +20,7 @@ enum Instruction {
     Div { to: u32, a: u32, b: u32 },
 }
 
-/// Where a result is found.
+/// The place of a result.
 #[derive(Clone, Copy, Debug)]
 struct Output {
     slot: u32,

@@ -11,9 +11,9 @@ use std::f64::consts::TAU;
 /// a point of the circle that `draw` gives.
 ///
 /// An angle that is p/q of another is p times one of which the other is q times. Where p or q exceeds
-/// `largest`, the angle gets a point of its own: no sum of fewer than p or q angles tells the two apart, so for
-/// functions of the low degrees of a Lagrangian the sine and cosine of both are as good as free. A constant between
-/// two angles that is no multiple of pi/2 is taken to 1e-12 rad.
+/// `largest`, the angle gets a point of its own: no sum of fewer than p or q angles distinguishes the two, so
+/// for functions of the low degrees of a Lagrangian the sine and cosine of both are as good as free. A
+/// constant between two angles that is no multiple of pi/2 is taken to 1e-12 rad.
 pub fn input_angles<A: Algebra>(
     alg: &A,
     arm: &Arm,
@@ -38,7 +38,7 @@ pub fn input_angles<A: Algebra>(
         let parts =
             tied_ratios.fold(IBig::one(), |parts, (_, ratio)| common(parts, &rational::denominator(ratio)));
         for (joint, ratio) in together {
-            // What is free has no constant to another angle.
+            // A free angle has no constant relation to another angle.
             if !tied(ratio) {
                 angles[joint] = Some(draw());
                 continue;

@@ -62,7 +62,7 @@ impl<'p, 'a, A: OverPrime> Varied<'p, 'a, A> {
         PlacementElements::build(&self.algebra, placement.as_ref(), self.point.symbols, number, symbol)
     }
 
-    /// What is added to a joint's position.
+    /// The change of a joint's position.
     fn change_of(&self, joint: usize) -> A::Value {
         let drive = &self.point.drives[joint];
         self.algebra.mul(&self.algebra.element(drive.ratio), &self.change[drive.coordinate])

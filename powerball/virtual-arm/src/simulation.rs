@@ -157,7 +157,7 @@ impl Simulation {
         let free: Vec<f64> = (0..n).map(|i| bias[i] + load[i]).collect();
         self.time += h;
 
-        // A first step tells the new velocities to within what friction changes on the way to them.
+        // A first step gives the new velocities except for the change of friction on the way to them.
         let [old, rest] =
             [self.velocities(), vec![[0.0; 2]; n]].map(|velocities| (self.friction(&velocities), velocities));
         let secants = chords(&rest, &old, |i| self.slope(i));

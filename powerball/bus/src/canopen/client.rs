@@ -108,7 +108,7 @@ impl Step {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     Idle,
-    /// Write asked for; `sent` bytes of the value are out (all of them where expedited).
+    /// A write was requested; `sent` bytes of the value are out (all of them where expedited).
     Download {
         sent: usize,
         started: bool,
@@ -175,7 +175,7 @@ impl Client {
         self.phase = Phase::Idle;
     }
 
-    /// Time: ends the transfer where the node did not answer, and tells the node.
+    /// Checks the time: ends the transfer if the node did not answer, and informs the node.
     pub fn poll(&mut self, now: Micros) -> Step {
         if self.is_idle() || now < self.deadline {
             return Step::NOTHING;

@@ -42,7 +42,7 @@ impl Command {
         })
     }
 
-    /// The frame that tells `node`, or every node where `None`.
+    /// The frame with this command for `node`, or for every node if `None`.
     pub const fn frame(self, node: Option<NodeId>) -> Frame {
         let address = match node {
             Some(node) => node.raw(),

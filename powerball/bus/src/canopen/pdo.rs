@@ -141,7 +141,7 @@ impl Mapping {
         (bytes, at.min(8))
     }
 
-    /// Each object with its raw value (not sign extended: its type is known to who asked for it; see
+    /// Each object with its raw value (not sign extended: the caller that mapped it knows its type; see
     /// [`sign_extend`]). `None` where `bytes` has not exactly the mapped length.
     pub fn unpack<'a>(&'a self, bytes: &'a [u8]) -> Option<impl Iterator<Item = (Entry, u32)> + 'a> {
         if bytes.len() != self.len() {

@@ -95,7 +95,7 @@ pub enum Cause {
     StateLost(NodeId, Statusword),
     /// A drive shows a state that the standard does not know.
     UnknownState(NodeId, Statusword),
-    /// A drive shows another mode than asked for.
+    /// A drive shows another mode than requested.
     WrongMode(NodeId, Mode),
     /// A node left NMT operational.
     NotOperational(NodeId),
@@ -130,7 +130,7 @@ pub enum Cause {
     /// Current mode: a joint's position is off its integrated velocity by this much, rad: one of the two is
     /// wrong.
     PositionAgainstVelocity(NodeId, JointNumber, f64),
-    /// Current mode: a joint's current is not the one that was asked for: measured and asked for, A.
+    /// Current mode: a joint's current is not the commanded one: measured and commanded, A.
     CurrentError(NodeId, JointNumber, f64, f64),
     /// Current mode: this much of a joint's torque does not act as in the model, and what may be, N·m.
     TorqueError(NodeId, JointNumber, f64, f64),
@@ -455,7 +455,7 @@ impl core::error::Error for Refusal {}
 pub enum Rejection {
     /// Joint's value is NaN or infinite.
     NotFinite(JointNumber),
-    /// Joint, position (asked for, or reached before it can stop) and the limit that it would pass, rad.
+    /// Joint, position (commanded, or reached before it can stop) and the limit that it would pass, rad.
     Position(JointNumber, f64, f64),
     /// Joint, velocity and greatest velocity, rad/s.
     Velocity(JointNumber, f64, f64),
@@ -465,7 +465,7 @@ pub enum Rejection {
     Jump(JointNumber, f64, f64),
     /// Joint, acceleration of its set-points and the greatest one, rad/s².
     Acceleration(JointNumber, f64, f64),
-    /// Joint, torque that the arm's model asks for and the greatest one, N·m.
+    /// Joint, torque that the arm's model requires and the greatest one, N·m.
     Torque(JointNumber, f64, f64),
     /// Joint whose value the drive's type cannot hold: it would be cut.
     Saturated(JointNumber),

@@ -51,7 +51,7 @@ pub struct Joint {
     pub emergency: Option<Emcy>,
     /// 0x1000: the device type; its low 16 bits are the number of the device profile.
     pub device_type: Option<u32>,
-    /// 0x1018: vendor, product, revision, serial number, as far as the drive tells them.
+    /// 0x1018: vendor, product, revision, serial number, as far as the drive reports them.
     pub identity: [Option<u32>; 4],
     /// When its last process data came, on the driver's clock, µs.
     pub answered_at: Micros,
@@ -87,14 +87,14 @@ pub struct Joint {
     /// Cycles, by the driver's count, whose position and velocity came last.
     pub(super) position_cycle: u64,
     pub(super) velocity_cycle: u64,
-    /// Greatest current that the drive gives (0x6073), A, where it tells.
+    /// Greatest current that the drive gives (0x6073), A, if the drive reports it.
     pub(super) current_limit: Option<f64>,
     /// Settings that the drive declined and need not have, by bit.
     pub(super) declined: u8,
     /// Profile position: the target announced last, and whether its announcing bit is up.
     pub(super) announced: Option<i32>,
     pub(super) raised: bool,
-    /// Way that velocity set-points asked for since `swept_from`, rad, and the position then.
+    /// Travel that velocity set-points commanded since `swept_from`, rad, and the position then.
     pub(super) swept: f64,
     pub(super) swept_from: f64,
     /// A stop that could not be queued yet.
@@ -205,8 +205,8 @@ impl Joint {
         self.raised = false;
     }
 
-    /// A cycle of `period` s with the velocity that was sent. Once enough way was asked for: the part of it
-    /// that the joint has gone, and a new beginning.
+    /// A cycle of `period` s with the velocity that was sent. Once enough travel was commanded: the part of
+    /// it that the joint has gone, and a new beginning.
     pub(super) fn sweep(&mut self, period: f64, enough: f64) -> Option<f64> {
         self.swept += self.demand.last() * period;
         if self.swept.abs() < enough {

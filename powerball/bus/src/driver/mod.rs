@@ -43,7 +43,7 @@
 //! | set-point NaN, jumping, outside the limits, more torque than a joint has | before it leaves | rejected, the last one held, counted; 3 cycles in a row: stop, [`Cause::Setpoints`] | 3 cycles |
 //! | torque offset NaN, beyond the joint's torque, jumping | before it leaves | as a set-point | 3 cycles |
 //! | no new set-point | in the slot | the last one held; 3 cycles in a row: stop, [`Cause::Starved`] (not in profile position) | 3 cycles |
-//! | velocities mean something else | way asked for and way gone, while the scale is not verified on hardware | stop, [`Cause::WrongVelocityScale`] | 0.1 rad |
+//! | velocities mean something else | commanded and measured travel, while the scale is not verified on hardware | stop, [`Cause::WrongVelocityScale`] | 0.1 rad |
 //! | joint not where or not as fast as commanded, stuck, jumping, beyond its limits, at its current limit | each cycle | stop, [`Cause::FollowingError`], [`Cause::VelocityError`], [`Cause::Stuck`], [`Cause::PositionJump`], [`Cause::PositionLimit`], [`Cause::TorqueLimit`] | [`profile::Reactions`] |
 //! | current mode: a joint that does not move as its torque says, measurements that no joint can have | each cycle | stop, [`Cause::ImplausibleVelocity`], [`Cause::PositionAgainstVelocity`], [`Cause::CurrentError`], [`Cause::TorqueError`], [`Cause::OffPath`] | [`profile::TorqueMode`] |
 //! | voltage, remote, internal limit, interpolation, following error in the statusword | each statusword of a joint with torque | stop, [`Cause::Hindered`] | at once, 3 cycles |

@@ -173,7 +173,7 @@ pub struct TorqueMode {
     pub slip_margin: f64,
     /// … forgotten with this time constant, s.
     pub slip_time: f64,
-    /// The measured current may be off the one that was asked for by this part of the greatest current.
+    /// The measured current may differ from the commanded one by this part of the greatest current.
     pub current_error: f64,
     /// The torque that acted may be off what the model needs for the measured motion by this part of the joint's torque, …
     pub torque_error: f64,
@@ -266,8 +266,9 @@ pub struct Profile<const N: usize> {
     pub master_heartbeat: Micros,
     /// A drive that misses the master's heartbeat for this long reacts; 0x1016, ms.
     pub master_watch_ms: u16,
-    /// Cycles without a fresh interpolation point before a drive stops quickly; 0x200E, not 0. `None` for drives of
-    /// another maker: 0x200E and the commutation search of 0x2050 are SCHUNK's, and neither is asked for then.
+    /// Cycles without a fresh interpolation point before a drive stops quickly; 0x200E, not 0. `None` for
+    /// drives of another maker: 0x200E and the commutation search of 0x2050 are SCHUNK's, and neither is
+    /// required then.
     pub sync_timeout_factor: Option<u8>,
     /// Period of the drives' heartbeats, 0x1017, ms.
     pub node_heartbeat_ms: u16,

@@ -173,7 +173,7 @@ pub(super) fn configuration<const N: usize>(
 pub(super) fn questions(mode: &ModeProfile, control: ControlMode) -> impl Iterator<Item = Object> {
     let identity = [DEVICE_TYPE, VENDOR_ID, PRODUCT_CODE, REVISION, SERIAL_NUMBER];
     let always = identity.into_iter().chain([objects::SUPPORTED_MODES, objects::RATED_CURRENT]);
-    // The greatest current is per mille of the rated one, and so asked for after it.
+    // The greatest current is per mille of the rated one, and so it is read after it.
     let always = always.chain([objects::MAX_CURRENT]);
     let velocity = [objects::VL_FACTOR_NUMERATOR, objects::VL_FACTOR_DENOMINATOR];
     let scaled = control == ControlMode::Velocity;

@@ -100,7 +100,7 @@ impl<const N: usize> Driver<N> {
     }
 
     /// The first cause stays. Only missing data gives way to what explains it: a node that restarts is missed
-    /// before it says so. What asks for a restart is not forgotten in any case.
+    /// before it says so. A cause that needs a restart is never forgotten.
     fn latch(&mut self, cause: Cause) {
         self.note(cause);
         let tells_more = |first| match first {
@@ -270,7 +270,7 @@ impl<const N: usize> Driver<N> {
         }
     }
 
-    /// After a stop: what the culprit tells of its error.
+    /// After a stop: the error details of the drive that caused it.
     pub(super) fn poll_diagnosis(&mut self, tx: &mut impl Transmit) {
         let Some((j, step)) = self.diagnosis else { return };
         let now = self.now;
@@ -288,7 +288,7 @@ impl<const N: usize> Driver<N> {
                 self.send(frame, tx);
             }
             if polled.done.is_some() {
-                // A silent node is not asked for the rest.
+                // A silent node is not read further.
                 self.diagnosis = None;
             }
         }

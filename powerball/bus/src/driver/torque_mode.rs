@@ -48,7 +48,7 @@ pub(super) struct Guarded {
     slip: f64,
     /// Currents that acted from the last SYNCs on, newest first, A.
     acted: [f64; WINDOW + 2],
-    /// The joint's own inertia by the model, kg·m²; nothing before it was asked for.
+    /// The joint's own inertia by the model, kg·m²; nothing before it was requested.
     inertia: Option<f64>,
     /// Distance from where the joint should be, and the tolerance, rad, if the caller gave them in this
     /// cycle.
@@ -267,7 +267,7 @@ impl<const N: usize> Driver<N> {
         Some(Cause::TorqueError(self.node(j), JointNumber::from_index(j), left, tolerance))
     }
 
-    /// Once a cycle, in current mode: a joint that is off its path, or has another current than was asked for.
+    /// Once a cycle, in current mode: a joint that is off its path, or has another current than commanded.
     pub(super) fn not_obeying(&mut self, j: usize) -> Option<Cause> {
         let (limits, node, number) =
             (self.profile.reactions.torque_mode, self.node(j), JointNumber::from_index(j));

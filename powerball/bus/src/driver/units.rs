@@ -11,7 +11,7 @@ pub const MILLIDEGREES_PER_RADIAN: f64 = 180_000.0 / PI;
 pub struct Saturated<T> {
     /// The nearest value of the type; 0 for NaN.
     pub value: T,
-    /// Whether it is another than asked for.
+    /// Whether it differs from the requested one.
     pub cut: bool,
 }
 

@@ -15,11 +15,11 @@ const STOP: Micros = 5_000_000;
 
 /// A [`Driver`] with the [`Bus`] that its arm is on.
 ///
-/// However a program leaves it, by an error, a panic or a signal ([`Master::with_interrupt`]), the arm is stopped: a
-/// master that is dropped while joints may have torque sends quick stop, closes the brakes, takes the torque away and
-/// tells the drives that they need not watch it any more. Where a program dies without leaving it (SIGKILL, an abort), a
-/// second process can send the stop (`Master::with_watchdog`); a machine that loses its power sends nothing, and then the
-/// drives' own watching stops them.
+/// However a program leaves it, by an error, a panic or a signal ([`Master::with_interrupt`]), the arm is
+/// stopped: a master that is dropped while joints may have torque sends quick stop, closes the brakes, takes
+/// the torque away and ends the drives' watch on it. Where a program dies without leaving it (SIGKILL, an
+/// abort), a second process can send the stop (`Master::with_watchdog`); a machine that loses its power sends
+/// nothing, and then the drives' own watching stops them.
 #[derive(Debug)]
 pub struct Master<B: Bus, const N: usize> {
     driver: Driver<N>,
@@ -50,7 +50,7 @@ pub enum Moment {
 pub enum ArmError {
     /// The driver does not do it.
     Refused(Refusal),
-    /// The driver stopped the arm, with what the drive tells of its error.
+    /// The driver stopped the arm, with the drive's report of its error.
     Stopped(Cause, String),
     /// The driver did not come to the phase in time.
     Slow(Phase, Phase),
@@ -227,7 +227,7 @@ impl<B: Bus, const N: usize> Master<B, N> {
         if self.driver.phase() != Phase::Faulted {
             return Ok(());
         }
-        // The driver reads what the drive tells of its error.
+        // The driver reads the drive's report of its error.
         let until = self.bus.now() + 300_000;
         while self.step(until)? != Moment::Over {}
         match self.driver.cause() {

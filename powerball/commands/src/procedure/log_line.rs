@@ -27,7 +27,7 @@ impl LogTime {
         LogTime { start, first: None }
     }
 
-    /// The time of a SYNC in the log, s. The first that is asked for is where it begins.
+    /// The time of a SYNC in the log, s. The first requested one is the beginning of the log.
     pub fn at(&mut self, sync: Micros) -> f64 {
         let since = sync.saturating_sub(*self.first.get_or_insert(sync));
         self.start + since as f64 * 1e-6

@@ -84,7 +84,8 @@ impl<T: RealField + Copy, const N: usize> Integrator<T, N> {
         &self.held
     }
 
-    /// A cycle of `period` s with an error e = q_r − q, rad, in which `asked` was asked for and `sent` was let through.
+    /// A cycle of `period` s with an error e = q_r − q, rad, in which `asked` was requested and `sent` was
+    /// sent.
     pub fn advance(&mut self, error: &SVector<T, N>, asked: &SVector<T, N>, sent: &SVector<T, N>, period: T) {
         for j in 0..N {
             let cut = asked[j] - sent[j];

@@ -3,7 +3,7 @@
 use super::number;
 use nalgebra::{RealField, SMatrix};
 
-/// Number of squarings: the 65 536th power of the loop tells its largest pole to 2·10⁻⁴ whatever its
+/// Number of squarings: the 65 536th power of the loop gives its largest pole to 2·10⁻⁴ whatever its
 /// eigenvectors are.
 const SQUARINGS: i32 = 16;
 

@@ -35,8 +35,9 @@ impl Body {
     }
 }
 
-/// Whether a body can be so: its mass, where it shows, is positive and no farther than `reach` from the joint, and its
-/// inertia is positive: without its mass nothing else tells a body from the lack of one elsewhere.
+/// Whether a body can be so: its mass, where it shows, is positive and no farther than `reach` from the
+/// joint, and its inertia is positive: without its mass nothing else distinguishes a body from the lack of
+/// one elsewhere.
 pub(super) fn is_possible(c: &[f64], reach: f64) -> bool {
     let size = Vector3::new(c[0], c[1], c[2]).norm();
     let inertia = c[INERTIA];

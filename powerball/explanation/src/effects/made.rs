@@ -207,7 +207,7 @@ mod tests {
         assert_eq!(get(1.0, 4.0, 12.0), 12.0);
         assert_eq!(get(2.0, 3.0, 13.0), 13.0);
         assert_eq!(get(1.0, 3.0, 14.0), 10.0);
-        // The model that was not asked for longest is forgotten.
+        // The model that was unused for the longest time is removed.
         for other in 3..3 + MODELS {
             assert_eq!(get(other as f64, 3.0, 20.0), 20.0);
         }

@@ -25,7 +25,7 @@ pub struct DesignedExperiment {
     pub expected: Vec<f64>,
     /// Evidence over the whole path, all joints together: χ² by which the wrong name would fall behind.
     pub evidence: f64,
-    /// How much better the path tells what only one of the names has than the old logs.
+    /// How much better than the old logs the path determines the quantities that only one of the names has.
     pub narrows: f64,
     /// `evidence` of the middle one of random paths.
     pub usual: f64,

@@ -288,8 +288,8 @@ impl<'s> Together<'s> {
         (square > 1e-6 * raw && score.is_finite()).then_some((theta, theta * score, base))
     }
 
-    /// The sums over blocks of all logs of a column times what would be left with it: by how much they vary tells how
-    /// surely its coefficient is known.
+    /// The sums over blocks of all logs of a column times what would be left with it: their variation shows
+    /// how surely its coefficient is known.
     pub(crate) fn by_block(&self, asked: &Asked) -> Vec<f64> {
         let mut sums = Vec::new();
         for (side, data) in self.data.iter().enumerate() {

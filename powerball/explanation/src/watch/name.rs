@@ -17,7 +17,7 @@ use powerball_logs::regression::{Column, Data, PULLED, Signals};
 
 /// Ends of a push are looked for on a grid of this, s.
 pub(super) const GRID: f64 = 0.1;
-/// Beginnings on a finer one, s: a row more or less tells a sudden change.
+/// Beginnings on a finer one, s: one row more or less matters for a sudden change.
 const FINE: f64 = 0.02;
 /// A push lasts at least this long, s.
 const SHORTEST: f64 = 0.3;

@@ -356,7 +356,7 @@ pub(super) struct Curves {
     /// Joint, from 0.
     joint: usize,
     points: Vec<Point>,
-    /// How much steeper `b`'s curve is, where the covariance of both tells it.
+    /// How much steeper `b`'s curve is, if the covariance of both determines it.
     steeper: Option<Difference>,
 }
 

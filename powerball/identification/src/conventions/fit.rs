@@ -207,7 +207,7 @@ const STEP: f64 = 0.02;
 const BAND: f64 = 4.0;
 /// A joint with fewer rows in a part is not judged.
 const FEWEST: usize = 20;
-/// The longest shift that can be asked for, s: rows keep this distance from the ends of a recording.
+/// The longest shift that can be tried, s: rows keep this distance from the ends of a recording.
 pub(super) const LONGEST: f64 = 0.2;
 
 /// The assumption about gravity in the torques.

@@ -196,7 +196,7 @@ pub(super) enum Common {
     Unknown,
 }
 
-/// The common sign of all torques: 1 or −1 where friction or the energy of motion tells it in both parts.
+/// The common sign of all torques: 1 or −1 if friction or the energy of motion shows it in both parts.
 pub(super) fn common(judged: &Judged, energies: &[Energies; 2]) -> Common {
     let both = |of: &dyn Fn(usize) -> f64| [of(0), of(1)];
     let kinetic = both(&|part| energies[part].kinetic(&judged.fits[part]).clear());
@@ -302,7 +302,7 @@ fn is_noisy(torque: &[f64], q: &[f64]) -> bool {
     deviation > NOISE * rms && follows < FOLLOWS
 }
 
-// Whether the torques hold what gravity asks for.
+// Whether the torques contain gravity.
 //
 // The first moments of the links show twice: in gravity and in inertia. Where gravity was taken out of the
 // torques, inertia still shows them, and the weight that they would have is missing.

@@ -44,7 +44,7 @@ pub struct TorqueColumns {
     pub unit: Option<String>,
     /// The side of the gear on which they are measured: with the friction of motor and gear, or without.
     pub side: Option<Side>,
-    /// Whether they hold what gravity asks for.
+    /// Whether they contain gravity.
     pub gravity: Option<GravityIs>,
     /// Whether they are measured or commanded.
     pub kind: Option<Kind>,

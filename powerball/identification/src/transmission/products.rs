@@ -316,7 +316,7 @@ impl Column {
 
 /// Band of the comparison, Hz.
 const BAND: f64 = 10.0;
-/// Smoothing of positions, Hz. Reversals are sharp, and what friction does at them tells its law; noise of
+/// Smoothing of positions, Hz. Reversals are sharp, and friction at them shows its law; noise of
 /// accelerations above the band does not count.
 const SMOOTHING: f64 = 25.0;
 /// Shortest piece that is used, s.

@@ -28,7 +28,7 @@ const AS_GOOD: f64 = 1.1;
 /// If more of a motor's torque stays, it does not belong to this joint: less than half of its square is
 /// explained.
 const UNRELATED: f64 = 0.7;
-/// A link torque of which this share is noise tells no ratio.
+/// A link torque of which this share is noise determines no ratio.
 const NOISE: f64 = 0.5;
 
 /// An effect that was found.

@@ -25,7 +25,7 @@ pub struct RigidArm {
     names: Vec<String>,
     /// Gravity as the arm file has it, m/s².
     filed: [Rational; 3],
-    /// The arm without its declared symmetries, all parameters apart: built when first asked for.
+    /// The arm without its declared symmetries, all parameters apart: built at the first use.
     unconstrained: OnceLock<Option<Wide>>,
     /// The arm at unit gravity along x, y and z of the base.
     unit_gravity: OnceLock<Option<[Wide; 3]>>,

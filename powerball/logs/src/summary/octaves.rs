@@ -98,8 +98,8 @@ impl Octaves {
         }
     }
 
-    /// Rounds each column to 28 binary digits of its length over all octaves: below what any sensor tells,
-    /// and what a file has to keep.
+    /// Rounds each column to 28 binary digits of its length over all octaves: below the resolution of any
+    /// sensor, and what a file has to keep.
     pub fn round(&mut self) {
         let step = |k: usize| {
             let square: f64 = self.levels.iter().flat_map(|level| level.column(k)).map(|x| x * x).sum();

@@ -285,7 +285,7 @@ mod tests {
         }
     }
 
-    /// Läuchli's matrix: the products of its columns lose what tells them apart, the factor keeps it.
+    /// Läuchli's matrix: the products of its columns lose the difference between them, the factor keeps it.
     #[test]
     fn what_products_would_lose_is_kept() {
         let small = 1e-9;

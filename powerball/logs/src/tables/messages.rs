@@ -166,7 +166,7 @@ impl Topics {
             Reader::Other => Ok(None),
         };
         row.end(done);
-        // What is not there is reported when the tables are asked for.
+        // A missing part is reported when the tables are requested.
         let _ = self.memory.claim_numbers(topic.table.numbers().saturating_sub(before));
     }
 

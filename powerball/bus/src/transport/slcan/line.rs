@@ -29,7 +29,7 @@ pub(super) enum State {
     Off,
 }
 
-/// The status flags that `F` asks for. Reading them clears those that are latched.
+/// The status flags that `F` reads. Reading them clears those that are latched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Flags(pub(super) u8);
 

@@ -1,8 +1,8 @@
 //! Serial adapters that speak slcan (Lawicel's lines of text), on a serial port of any system or a pseudo terminal.
 //!
-//! The adapter is asked for its status flags four times a second, if it answers at all: some do not, and a program
-//! at the other end of a pseudo terminal need not. Source: Lawicel's CAN232 and CANUSB manuals, and for lines that an
-//! adapter sends by itself Linux's drivers/net/can/slcan.
+//! The status flags of the adapter are read four times a second, if it answers at all: some do not, and a
+//! program at the other end of a pseudo terminal need not. Source: Lawicel's CAN232 and CANUSB manuals, and
+//! for lines that an adapter sends by itself Linux's drivers/net/can/slcan.
 
 mod line;
 #[cfg(test)]

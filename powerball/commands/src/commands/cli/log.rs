@@ -84,7 +84,7 @@ impl LogCommand {
         if refused.is_empty() { Ok(()) } else { Err(Failure::Refused(refused.join("\n"))) }
     }
 
-    /// The log as another file, where that is asked for.
+    /// The log as another file, if requested.
     fn write(&self, files: &[Inspected], arm: Option<&Arm>) -> Result<(), Failure> {
         let (Some(to), Some(out), Some(arm)) = (self.to, &self.out, arm) else { return Ok(()) };
         let unusable = |what: &str| Err(Failure::Unusable(format!("{}: {what}", out.display())));

@@ -31,7 +31,7 @@ impl<const N: usize> Parts<N> {
         between(&self.friction, at) + between(&self.effects, at)
     }
 
-    /// The joint that a sample asks for more torque than `limits` (N·m): sample, joint from 0, torque.
+    /// The joint that needs more torque at a sample than `limits` (N·m): sample, joint from 0, torque.
     #[must_use]
     pub fn beyond(&self, limits: &SVector<f64, N>) -> Option<(usize, usize, f64)> {
         (0..self.rigid.len()).find_map(|k| {

@@ -355,7 +355,7 @@ pub(crate) struct Judge<'j> {
     pub(crate) tests: f64,
     /// The model without the candidate, fitted to the validation set …
     pub(crate) cross_validation: &'j OnceLock<CrossValidation>,
-    /// … and how it is fitted, once it is asked for.
+    /// … and how it is fitted, once it is needed.
     pub(crate) swap: &'j (dyn Fn() -> CrossValidation + Sync),
 }
 

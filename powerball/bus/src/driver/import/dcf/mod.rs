@@ -199,7 +199,7 @@ impl Dcf {
         value.number().map(|number| number.of(node))
     }
 
-    /// The maker's number, where the file tells it.
+    /// The maker's number, if the file has it.
     pub(super) fn vendor(&self) -> Option<u32> {
         let number = self.info.get("vendornumber").and_then(|text| Number::parse(text))?;
         u32::try_from(number.of(0)).ok().filter(|vendor| *vendor > 0)

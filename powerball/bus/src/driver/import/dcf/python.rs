@@ -72,7 +72,8 @@ fn every_object_is_read_as_python_canopen_reads_it() {
     assert_eq!(compared, 101 + 28 + 8 + 2 + 5);
 }
 
-/// python-canopen makes the parts of an array that no section names when they are asked for; here they are there.
+/// python-canopen makes the parts of an array that no section names when they are requested; here they are
+/// there.
 #[test]
 fn nothing_is_read_that_python_canopen_does_not_read_but_parts_of_arrays() {
     for name in ["sample", "datatypes", "node", "canfestival", "compact"] {
