@@ -307,7 +307,7 @@ impl<'f> Steps<'f> {
     }
 
     /// For each column of a link, values of a motion's monomials under which it is one and the link's others
-    /// are zero; a rotor's column is no function of the motion.
+    /// are zero; a rotor's column is not a function of the motion.
     pub(super) fn lifted(&self, joint: usize) -> Vec<Values> {
         let one = self.field.rational(rational::integer(1));
         let before = listed(self.turned(joint, true));

@@ -29,7 +29,7 @@ pub struct JointAngle {
     pub coordinate: usize,
     /// Ratio of a joint that follows another one; `None` if q is the joint's own.
     pub ratio: Option<f64>,
-    /// Theta where it is no multiple of pi/2, and the offset of a joint that follows another one, rad.
+    /// Theta where it is not a multiple of pi/2, and the offset of a joint that follows another one, rad.
     pub offset: f64,
     /// The quarter turns of theta, which are not in the angle.
     quarters: u8,
@@ -225,7 +225,7 @@ mod tests {
         let angles = angles(", ratio = 2, offset = 0.1");
         let all = JointSum::of([(0, false), (1, true), (2, false)]).0;
         assert_eq!(angles.coordinates(all), BTreeSet::from([0, 1]));
-        // Of theta, what is no quarter turn.
+        // Of theta, what is not a quarter turn.
         assert_eq!([0, 1, 2].map(|joint| angles.joint(joint).offset), [0.0, 0.3, 0.1]);
         assert_eq!(angles.offset(all), -0.3 + 0.1);
         assert_eq!(angles.value(all, |q| [1.0, 10.0][q]), 1.0 - 10.3 + 2.1);

@@ -47,7 +47,7 @@ fn twist_index(arm: &Arm, joint: usize) -> Option<usize> {
     }
 }
 
-/// Quarter turns of the twist before a joint; `None` where it is no multiple of pi/2.
+/// Quarter turns of the twist before a joint; `None` where it is not a multiple of pi/2.
 fn quarter_turns(arm: &Arm, joint: usize) -> Option<u8> {
     twist_index(arm, joint).map_or(Some(0), |k| arm.joints[k].alpha.quarter_turns())
 }

@@ -32,7 +32,7 @@ impl Angle {
         if radians.is_zero() {
             return Angle::PiMultiple(multiple);
         }
-        // pi is no rational; what is added to a number of radians is as near to it as a number can be.
+        // pi is not a rational; what is added to a number of radians is as near to it as a number can be.
         let turn = rational::from_f64(Angle::PiMultiple(multiple).radians()).unwrap_or_default();
         Angle::from_radians(radians + turn)
     }

@@ -68,7 +68,7 @@ impl Fp {
     /// The sine and cosine of the angle whose half has this tangent: 2t/(1+t²), (1−t²)/(1+t²).
     pub fn circle_point(self) -> (Fp, Fp) {
         let square = self * self;
-        // 1 + t² is never zero: −1 is no square modulo a prime ≡ 3 mod 4.
+        // 1 + t² is never zero: −1 is not a square modulo a prime ≡ 3 mod 4.
         let scale = (Fp::ONE + square).inverse().unwrap_or(Fp::ONE);
         ((self + self) * scale, (Fp::ONE - square) * scale)
     }

@@ -7,7 +7,7 @@ use num_traits::Signed;
 /// An exact rational number of any size.
 pub type Rational = RBig;
 
-/// Powers of ten beyond this are no length, mass or angle, and would only fill the memory.
+/// Powers of ten beyond this are not a length, mass or angle, and would only fill the memory.
 const LARGEST_EXPONENT: i64 = 60;
 /// Longer literals are refused for the same reason.
 const LONGEST_LITERAL: usize = 80;

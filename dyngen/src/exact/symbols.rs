@@ -47,7 +47,7 @@ pub enum SymbolKind {
     Twelfth,
 }
 
-/// The distinct angles of an arm whose sine and cosine are no rationals, each between 0 and pi/4 where it is
+/// The distinct angles of an arm whose sine and cosine are not rationals, each between 0 and pi/4 where it is
 /// a multiple of pi, and positive otherwise.
 #[derive(Clone, Debug, Default)]
 pub struct AngleSymbols {

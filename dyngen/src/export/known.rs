@@ -42,7 +42,7 @@ impl Known {
     /// Missing values of the files: each link needs all its parameters, and they must be possible for a body.
     pub fn read(arm: &Arm, values: (&str, &str), friction: Option<(&str, &str)>) -> Result<Known, String> {
         let (text, file) = values;
-        // Text that is no JSON, and keys that stand twice, are reported as for any values file.
+        // Text that is not JSON, and keys that stand twice, are reported as for any values file.
         let json: Value = serde_json::from_str(text).map_err(|e| format!("{file}: not valid JSON: {e}"))?;
         let consistent = json.get("consistent").and_then(|c| c.get("parameters")).map(Value::to_string);
         let given = Values::parse(consistent.as_deref().unwrap_or(text), file).map_err(|e| e.to_string())?;

@@ -20,7 +20,7 @@ use roxmltree::{Document, Node};
 /// in errors, and `options` say base, tip and locked joints as they did for the import.
 ///
 /// # Errors
-/// Where the file is no model of this arm, or has no body for a link that has mass.
+/// Where the file is not a model of this arm, or has no body for a link that has mass.
 pub fn mjcf(
     text: &str,
     file: &str,

@@ -58,8 +58,8 @@ impl std::ops::Neg for Expr {
 /// An input of a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Input {
-    /// sin q of a revolute joint, or sin(q + theta) where theta is no multiple of pi/2; or of a sum of such
-    /// angles.
+    /// sin q of a revolute joint, or sin(q + theta) where theta is not a multiple of pi/2; or of a sum of
+    /// such angles.
     Sin(JointSum),
     /// The cosine of the same angle.
     Cos(JointSum),

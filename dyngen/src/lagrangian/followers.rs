@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 /// An angle that is p/q of another is p times one of which the other is q times. Where p or q exceeds
 /// `largest`, the angle gets a point of its own: no sum of fewer than p or q angles distinguishes the two, so
 /// for functions of the low degrees of a Lagrangian the sine and cosine of both are as good as free. A
-/// constant between two angles that is no multiple of pi/2 is taken to 1e-12 rad.
+/// constant between two angles that is not a multiple of pi/2 is taken to 1e-12 rad.
 pub fn input_angles<A: Algebra>(
     alg: &A,
     arm: &Arm,
@@ -71,8 +71,8 @@ pub fn quarter_turned<A: Algebra>(alg: &A, turns: u8, (s, c): (A::Value, A::Valu
     }
 }
 
-/// Sine and cosine of q + theta of a joint from those of its trigonometric input, which holds theta already where
-/// that is no multiple of pi/2.
+/// Sine and cosine of q + theta of a joint from those of its trigonometric input, which holds theta already
+/// where that is not a multiple of pi/2.
 pub fn with_theta<A: Algebra>(alg: &A, theta: &Angle, input: (A::Value, A::Value)) -> (A::Value, A::Value) {
     quarter_turned(alg, theta.quarter_turns().unwrap_or(0), input)
 }

@@ -64,7 +64,7 @@ impl Mounting {
     /// The arm mounted so. Gravity is taken to six decimals: turns by right angles stay exact.
     ///
     /// # Errors
-    /// Gravity that is no number: which; joints that follow others.
+    /// Gravity that is not a number: which; joints that follow others.
     pub fn of(&self, arm: &Arm) -> Result<Arm, String> {
         arm.without_mimics()?;
         let mut mounted = arm.clone();

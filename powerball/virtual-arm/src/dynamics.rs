@@ -354,7 +354,7 @@ impl Body {
     }
 }
 
-/// The bodies of a vector of parameters, eleven a link; `None` where its length is no multiple of eleven.
+/// The bodies of a vector of parameters, eleven a link; `None` where its length is not a multiple of eleven.
 pub fn bodies(parameters: &[f64]) -> Option<Vec<Body>> {
     let (links, rest) = parameters.as_chunks::<PER_LINK>();
     rest.is_empty().then(|| links.iter().map(Body::from_parameters).collect())

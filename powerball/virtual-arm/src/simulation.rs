@@ -38,7 +38,7 @@ struct Motor {
 #[derive(Clone, Debug)]
 pub struct Simulation {
     plant: Plant,
-    /// The bodies as effects change them; a motor behind a winding gear is no part of them.
+    /// The bodies as effects change them; a motor behind a winding gear is not part of them.
     dynamics: Dynamics,
     motors: Vec<Option<Motor>>,
     states: Vec<State>,
@@ -144,7 +144,7 @@ impl Simulation {
     /// One step of `h` s under the drives' torques `tau` at the joints, N·m, which hold their value within
     /// it.
     ///
-    /// A plant that is no possible arm, or a torque that is no number, stops where it is.
+    /// A plant that is no possible arm, or a torque that is not a number, stops where it is.
     pub fn step(&mut self, h: f64, tau: &[f64]) {
         let n = self.dof();
         if self.stale == 0 {

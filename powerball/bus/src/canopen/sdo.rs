@@ -119,7 +119,7 @@ pub enum Response {
     },
 }
 
-/// A frame that is no SDO command known here: not eight bytes, or a command of block transfer.
+/// A frame that is not an SDO command known here: not eight bytes, or a command of block transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Malformed;
 

@@ -167,7 +167,8 @@ pub struct TorqueMode {
     pub missing_cycles: u8,
     /// A joint measured faster than this times its greatest velocity stops the arm.
     pub overspeed_factor: f64,
-    /// A velocity that grows in one cycle by more than this part of the greatest one is no measurement: it is not used.
+    /// A velocity that grows in one cycle by more than this part of the greatest one is not a measurement: it
+    /// is not used.
     pub velocity_step: f64,
     /// Way by which position and integrated velocity may drift apart, rad, next to a cycle at the greatest velocity …
     pub slip_margin: f64,

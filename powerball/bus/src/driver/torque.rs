@@ -134,7 +134,7 @@ impl Demand {
         let v = self.velocity(period);
         let before = (self.points[1] - self.points[2]) / period;
         let most = acceleration * period;
-        // Not `clamp`, which panics where a bound is no number.
+        // Not `clamp`, which panics where a bound is not a number.
         let change = (v - before).max(-most).min(most);
         let mut next = (v + change).max(-velocity).min(velocity);
         let (last, [low, high]) = (self.points[0], position);

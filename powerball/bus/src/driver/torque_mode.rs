@@ -74,7 +74,7 @@ struct Sample {
     velocity: f64,
 }
 
-/// Whether a magnitude is more than `limit`. What is no number is.
+/// Whether a magnitude is more than `limit`. What is not a number is.
 fn beyond(value: f64, limit: f64) -> bool {
     value.abs().partial_cmp(&limit).is_none_or(Ordering::is_gt)
 }

@@ -52,7 +52,7 @@ impl<const N: usize> Driver<N> {
         self.release_guard();
     }
 
-    /// Each position: an encoder that jumps is no measurement.
+    /// Each position: an encoder that jumps is not a measurement.
     pub(super) fn watch_position(&mut self, j: usize, tx: &mut impl Transmit) {
         let (reactions, now, period) = (self.profile.reactions, self.now, self.profile.sync_period);
         let (Some(profile), Some(joint)) = (self.profile.joints.get(j), self.joints.get_mut(j)) else {

@@ -62,7 +62,7 @@ pub fn encode(frame: &Frame, timestamp: f64) -> Vec<u8> {
     rmp_serde::to_vec_named(&sent).unwrap_or_default()
 }
 
-/// The frame in a datagram; `None` for what is no classic data frame with an 11-bit identifier.
+/// The frame in a datagram; `None` for what is not a classic data frame with an 11-bit identifier.
 #[must_use]
 pub fn decode(bytes: &[u8]) -> Option<Frame> {
     let heard: Heard<'_> = rmp_serde::from_slice(bytes).ok()?;

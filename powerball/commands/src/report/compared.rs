@@ -6,7 +6,7 @@ use powerball_identification::comparison::{Comparison, FrictionDifference};
 /// comparison.json and report.html.
 ///
 /// # Errors
-/// A result that is no JSON.
+/// A result that is not JSON.
 pub fn files(compared: &Comparison) -> Result<Files, String> {
     Ok(Files::default().json("comparison.json", compared)?.with("report.html", page(compared).to_html()))
 }

@@ -6,7 +6,7 @@ use crate::report::{Figure, Files, Ink, Page, Panel, Table, Tone, number};
 /// follow.json and report.html; `tracks` by name in the order in which they were driven, the last one in detail.
 ///
 /// # Errors
-/// A result that is no JSON.
+/// A result that is not JSON.
 pub fn files<const N: usize>(
     followed: &Followed,
     path: &Path<N>,

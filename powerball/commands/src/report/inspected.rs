@@ -6,7 +6,7 @@ use powerball_logs::log::{Inspected, InspectedTable, Log};
 /// log.json and report.html.
 ///
 /// # Errors
-/// A result that is no JSON.
+/// A result that is not JSON.
 pub fn files(files: &[Inspected]) -> Result<Files, String> {
     let asked = serde_json::json!({ "files": files });
     Ok(Files::default().json("log.json", &asked)?.with("report.html", page(files).to_html()))
@@ -148,7 +148,7 @@ fn taken(log: &Log) -> Figure {
         let mut points = Vec::new();
         for piece in &log.pieces {
             points.extend(piece.clone().map(|k| (log.t[k], signal[k])));
-            // A gap is no line.
+            // A gap is not a line.
             points.push((f64::NAN, f64::NAN));
         }
         Series::line(format!("joint {}", j + 1), JOINTS[j % JOINTS.len()], points)

@@ -32,7 +32,7 @@ pub fn stream_page() -> String {
 
 /// Longer curves keep the lowest and highest value of this many stretches: an hour at 20 Hz.
 const STRETCHES: usize = 75_000;
-/// Values are stored in this many steps of their range; the code below all of them is no number.
+/// Values are stored in this many steps of their range; the code below all of them is not a number.
 const STEPS: f64 = 65_000.0;
 const NOT_A_NUMBER: i16 = i16::MIN;
 

@@ -7,7 +7,7 @@ use powerball_identification::Verified;
 /// verified.json and report.html.
 ///
 /// # Errors
-/// A result that is no JSON.
+/// A result that is not JSON.
 pub fn files(verified: &Verified) -> Result<Files, String> {
     Ok(Files::default().json("verified.json", verified)?.with("report.html", page(verified).to_html()))
 }

@@ -101,7 +101,7 @@ impl<T: RealField + Copy, const P: usize> Bet<T, P> {
         solved(self.information + self.usual * self.held(HELD), &self.score)
     }
 
-    /// The size that is usual: a lasting model error along the change's columns is no change.
+    /// The size that is usual: a lasting model error along the change's columns is not a change.
     pub(super) fn usual_size(&self) -> SVector<T, P> {
         solved(self.usual * (T::one() + self.held(USUALLY)), &self.usual_score)
     }

@@ -13,19 +13,19 @@
 //! variance, no independence of joints. (The means of normal innovations that are cut so are 0.0085, less
 //! than [`LEAST_MARGIN`].)
 //!
-//! **The test** ([`Bet`]) bets against it. A change adds Σ c_i·x_i to the torques: x are columns that are known (a kilogram
-//! in the hand, a radian of a joint's zero), c is its size, which is not. The bet takes c from the samples before: least
-//! squares over the last [`WINDOW`], so it is known before the sample that it is put on. With μ_j = Σ c_i·x_ij the
-//! share λ_j ∝ |μ_j| − m_j goes on joint j, in the direction of μ_j, and the capital is multiplied by
-//! 1 + Σ λ_j·(±z_j − m_j), z cut. A lasting model error along x is no change: its size over the last minute
-//! is followed as friction is, and z is less that as well. Under the null the mean of that factor is at most
-//! 1, whichever joints depend on each other and whenever the bet began: it is an e-process. A new bet starts
-//! at every sample, with a capital b ≤ 1 that is known before, and all its beginnings together have
-//! C ← (C + b)·factor (e-SR). Under the null the mean of C grows by at most 1 a sample, and so does that of
-//! an average of C over bets. The alarm rises when the average exceeds A ([`alarm`]): then the mean time to a
-//! false alarm is at least A samples, whatever the noise is like (J. Shin, A. Ramdas, A. Rinaldo,
-//! "E-detectors: a nonparametric framework for sequential change detection", 2022; I. Waudby-Smith, A.
-//! Ramdas, "Estimating means of bounded random variables by betting", 2023).
+//! **The test** ([`Bet`]) bets against it. A change adds Σ c_i·x_i to the torques: x are columns that are
+//! known (a kilogram in the hand, a radian of a joint's zero), c is its size, which is not. The bet takes c
+//! from the samples before: least squares over the last [`WINDOW`], so it is known before the sample that it
+//! is put on. With μ_j = Σ c_i·x_ij the share λ_j ∝ |μ_j| − m_j goes on joint j, in the direction of μ_j, and
+//! the capital is multiplied by 1 + Σ λ_j·(±z_j − m_j), z cut. A lasting model error along x is not a change:
+//! its size over the last minute is followed as friction is, and z is less that as well. Under the null the
+//! mean of that factor is at most 1, whichever joints depend on each other and whenever the bet began: it is
+//! an e-process. A new bet starts at every sample, with a capital b ≤ 1 that is known before, and all its
+//! beginnings together have C ← (C + b)·factor (e-SR). Under the null the mean of C grows by at most 1 a
+//! sample, and so does that of an average of C over bets. The alarm rises when the average exceeds A
+//! ([`alarm`]): then the mean time to a false alarm is at least A samples, whatever the noise is like (J.
+//! Shin, A. Ramdas, A. Rinaldo, "E-detectors: a nonparametric framework for sequential change detection",
+//! 2022; I. Waudby-Smith, A. Ramdas, "Estimating means of bounded random variables by betting", 2023).
 
 mod bet;
 mod joint;

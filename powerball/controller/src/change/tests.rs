@@ -174,7 +174,8 @@ fn a_bet_is_fair_at_the_margin() {
     assert!(won > 10.0 * error, "{won} {error}");
 }
 
-/// Friction that wanders slowly within its range is no change, and more of it by three times the range is one.
+/// Friction that wanders slowly within its range is not a change, and more of it by three times the range is
+/// one.
 #[test]
 fn friction_may_wander_within_its_range() {
     let wander = |share: f64| {

@@ -51,7 +51,7 @@ impl<T: RealField + Copy> CartesianImpedance<T> {
         }
     }
 
-    /// The torque, N·m; `None` where B is no mass matrix.
+    /// The torque, N·m; `None` where B is not a mass matrix.
     #[must_use]
     pub fn torque<const N: usize>(
         &self,

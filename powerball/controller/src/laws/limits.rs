@@ -4,7 +4,7 @@ use nalgebra::{RealField, SVector};
 
 /// Cuts torques to what joints have and to how fast it may change; the last stage of every controller.
 ///
-/// What is no number is replaced by the last torque.
+/// What is not a number is replaced by the last torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limiter<T, const N: usize> {
     /// Greatest torque by joint, N·m.
@@ -27,7 +27,7 @@ impl<T: RealField + Copy, const N: usize> Limiter<T, N> {
         {
             if asked.is_finite() {
                 let step = *rate * period;
-                // Not `clamp`, which panics where a bound is no number.
+                // Not `clamp`, which panics where a bound is not a number.
                 let near = asked.max(*last - step).min(*last + step);
                 *last = near.max(-*most).min(*most);
             }

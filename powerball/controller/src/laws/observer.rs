@@ -29,7 +29,8 @@ impl<T: RealField + Copy, const N: usize> MomentumObserver<T, N> {
     /// A cycle later, by `period` s: the state now, and the torque on the rigid arm that acted since the last call
     /// (motor torque less friction and effects), N·m. Gives the external torques, N·m. The first call only begins.
     ///
-    /// Discretised with the exact pole e^(−K·T); Cᵀq̇ − g by the trapezoidal rule. A state that is no number changes nothing.
+    /// Discretised with the exact pole e^(−K·T); Cᵀq̇ − g by the trapezoidal rule. A state that is not a
+    /// number changes nothing.
     pub fn advance(
         &mut self,
         model: &impl ArmModel<T, N>,
@@ -64,7 +65,7 @@ impl<T: RealField + Copy, const N: usize> MomentumObserver<T, N> {
 /// Force and moment on the tool's frame that external torques at the joints fit best: (J·Jᵀ + λ²·I)⁻¹·J·τ_ext, N above N·m,
 /// in base axes. `damping` is λ² (m², rad²), which bounds what a singular pose cannot tell.
 ///
-/// `None` where J is no number.
+/// `None` where J is not a number.
 #[must_use]
 pub fn tool_force<T: RealField + Copy, const N: usize>(
     jacobian: &SMatrix<T, 6, N>,

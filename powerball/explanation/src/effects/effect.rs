@@ -140,7 +140,7 @@ pub trait Effect: Sync {
         Vec::new()
     }
 
-    /// The laws of a candidate at its first joint, one a column; none where it is no torque of a joint.
+    /// The laws of a candidate at its first joint, one a column; none where it is not a torque of a joint.
     fn laws(&self, _context: &Context<'_>, _candidate: &Candidate) -> Vec<Law<f64>> {
         Vec::new()
     }

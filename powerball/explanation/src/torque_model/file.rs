@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::Path;
 
-/// Why a file is no model of an arm.
+/// Why a file is not a model of an arm.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct FileError(String);
@@ -196,7 +196,7 @@ impl TorqueModel {
     /// Reads a model: `model.json` or `identified.json`.
     ///
     /// # Errors
-    /// [`FileError`] where the file cannot be read or is no model.
+    /// [`FileError`] where the file cannot be read or is not a model.
     pub fn read(path: &Path) -> Result<TorqueModel, FileError> {
         TorqueModel::parse(&read_text(path)?, path)
     }

@@ -262,7 +262,7 @@ pub enum Unchanged {
     /// A name that is not one of the arm's parameters.
     #[error("arm_changes.not_zero: '{0}' is no parameter of this arm")]
     NoParameter(String),
-    /// Gravity that is no number.
+    /// Gravity that is not a number.
     #[error("arm_changes.gravity must be three finite numbers")]
     Gravity,
 }

@@ -202,7 +202,7 @@ pub struct Body {
 /// Why two fits cannot be compared.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CompareError {
-    /// A file cannot be read or is no fit.
+    /// A file cannot be read or is not a fit.
     #[error("{0}")]
     Unreadable(String),
     /// The fits are of different arms or parameter sets.

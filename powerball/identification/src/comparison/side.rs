@@ -24,7 +24,7 @@ pub struct Side {
     pub friction: Vec<JointFriction>,
     /// How well all of it is known together; without it the standard errors count one by one.
     pub uncertainty: Option<Uncertainty>,
-    /// The strokes of its log by joint; nothing where it is no fit of one log.
+    /// The strokes of its log by joint; nothing where it is not a fit of one log.
     pub strokes: Vec<Vec<Stroke>>,
     /// Why it should not be used, each a sentence without its full stop; empty where it may be.
     pub unusable: Vec<String>,

@@ -47,7 +47,7 @@ const ALIKE: f64 = 0.05;
 const SKIPPED: usize = 4;
 /// Strokes in either direction that a comparison needs.
 const FEWEST: usize = 2;
-/// Friction of an arm at work wanders by as much with its warmth: what differs by less is no difference.
+/// Friction of an arm at work wanders by as much with its warmth: what differs by less is not a difference.
 const WANDERS: f64 = 0.05;
 
 /// The strokes of each joint along a log, in their order.

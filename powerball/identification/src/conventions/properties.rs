@@ -18,15 +18,15 @@ use powerball_logs::log::Log;
 // is 0.04 to 21 kg/m³. A unit that is a thousand times too small or a gear ratio that is missing is far
 // beyond both.
 
-/// The geometric mean of both above this is no arm's, kg/m³.
+/// The geometric mean of both above this is not that of an arm, kg/m³.
 const HEAVIEST: f64 = 100.0;
 /// Inertia alone above this.
 const HEAVIEST_INERTIA: f64 = 300.0;
-/// Both below these are no arm's either.
+/// Both below these are not that of an arm either.
 const LIGHTEST: [f64; 2] = [0.2, 0.02];
 /// Torques that stay below this share of every joint's limit are too small, where they carry the arm's weight.
 const IDLE: f64 = 0.03;
-/// Weight below this share of inertia is no weight: arms have once to thirty times as much.
+/// Weight below this share of inertia is not a weight: arms have once to thirty times as much.
 const WEIGHTLESS: f64 = 0.15;
 /// Factors agree with numbers of the arm file within this.
 const AGREE: f64 = 1.2;

@@ -487,8 +487,8 @@ mod tests {
         model.arm().kept_parameters().iter().map(|p| all[p.index()]).collect()
     }
 
-    /// Table 3 is no arm's; the nearest arm is one, and no other real arm is nearer by more than the
-    /// certificate.
+    /// Table 3 is not that of an arm; the nearest arm is one, and no other real arm is nearer by more than
+    /// the certificate.
     #[test]
     fn table_3_becomes_an_arm_and_none_is_nearer() {
         let model = model(include_str!("../../../controller/arm.toml"));

@@ -144,7 +144,7 @@ fn reduce(
     let mut summary = Summary::new(body, options);
     let mut refused = None;
     for log in logs {
-        // One log that cannot be used is no reason to refuse the others.
+        // One log that cannot be used is not a reason to refuse the others.
         refused = summary.push_corrected(body, log, options, &mut correct).err().or(refused);
     }
     match refused {

@@ -346,7 +346,7 @@ impl Layout {
         self.inertial + FRICTION * self.dof + which
     }
 
-    /// Whether a column is a tangent of a shape, whose coefficient is no parameter.
+    /// Whether a column is a tangent of a shape, whose coefficient is not a parameter.
     #[must_use]
     pub fn is_tangent(&self, column: usize) -> bool {
         column.checked_sub(self.inertial).is_some_and(|f| f < FRICTION * self.dof && f % FRICTION >= 3)

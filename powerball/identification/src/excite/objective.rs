@@ -269,7 +269,7 @@ fn customary(model: &Model) -> Result<Vec<usize>, Error> {
     let (q, dq, ddq) = (draw(), draw(), draw());
     let mut y = vec![0.0; 4 * p * n * p];
     evaluator.evaluate(&q, &dq, &ddq, &[], &mut y);
-    // In the order of the preference, what is no combination of columns before it.
+    // In the order of the preference, what is not a combination of columns before it.
     let (mut chosen, mut basis): (Vec<usize>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
     for parameter in Preference::ALL[0].order(model.arm()) {
         let Some(c) = kept.iter().position(|k| *k == parameter) else { continue };

@@ -122,7 +122,7 @@ pub fn inactive_joints(arm: &Arm, logs: &[Log]) -> Vec<Option<String>> {
 
 impl Inactive {
     fn of(logs: &[Log], joint: usize, kind: JointKind) -> Option<Inactive> {
-        // Within a log: that a joint was elsewhere in another one is no motion.
+        // Within a log: that a joint was elsewhere in another one is not a motion.
         let within = |log: &Log| {
             let ends = [f64::INFINITY, f64::NEG_INFINITY];
             let [low, high] = log.q[joint].iter().fold(ends, |[low, high], q| [low.min(*q), high.max(*q)]);

@@ -7,7 +7,7 @@
 use super::schema::Bits;
 use std::borrow::Cow;
 
-/// A number of values or letters beyond this is no message of joints.
+/// A number of values or letters beyond this is not a message of joints.
 const MOST_OF_A_TYPE: usize = 1 << 28;
 
 /// The bytes of a message, read from the front.

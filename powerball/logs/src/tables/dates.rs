@@ -6,7 +6,7 @@ use jiff::tz::Offset;
 
 /// The time of a date, s since 1970 in UTC; one without a zone is taken to be in UTC.
 pub(crate) fn seconds(text: &str) -> Option<f64> {
-    // Most of what is no number is no date either.
+    // Most of what is not a number is no date either.
     if text.len() < "2024-5-1".len() || !text.starts_with(|c: char| c.is_ascii_digit()) {
         return None;
     }

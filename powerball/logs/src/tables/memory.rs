@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 static ALLOWED: AtomicU64 = AtomicU64::new(0);
 /// Bytes that a log may take where none was set and the system does not report what is free.
 const ELSEWHERE: u64 = 4_000_000_000;
-/// A table of more columns is no log: an arm has some dozens, and a recording of a whole robot some hundreds.
+/// A table of more columns is not a log: an arm has some dozens, and a recording of a whole robot some
+/// hundreds.
 const MOST_COLUMNS: usize = 10_000;
 /// Bytes of a number.
 const NUMBER: u64 = 8;

@@ -67,7 +67,7 @@ pub(super) fn numbers(array: &ArrayRef, width: usize) -> Vec<Vec<f64>> {
     (0..width).map(|k| (0..array.len()).map(|row| of_row(row, k)).collect()).collect()
 }
 
-/// A column without lists: times in s, not a number of what is no number.
+/// A column without lists: times in s, not a number of what is not a number.
 fn scalars(array: &ArrayRef) -> Vec<f64> {
     match array.data_type() {
         DataType::Float64 => of::<Float64Type>(array, |x| x),

@@ -9,7 +9,7 @@ use super::cdr::Cdr;
 use super::table::Row;
 use std::collections::HashMap;
 
-/// Values of one array beyond this are no joints.
+/// Values of one array beyond this are not joints.
 pub(super) const MOST: usize = 64;
 /// Messages within messages.
 const DEEPEST: usize = 16;

@@ -24,7 +24,7 @@ const OTHERS: [(&[u8], &str); 7] = [
     (b"version https://git-lfs", "what Git leaves in place of a large file: fetch it by git lfs pull"),
 ];
 
-/// Why a file that begins so is no text: in words, after its name.
+/// Why a file that begins so is not text: in words, after its name.
 pub(super) fn no_text(head: &[u8]) -> Option<String> {
     if head.trim_ascii().is_empty() {
         return Some("is empty".to_string());

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 /// Elastic sliders that make up presliding.
 const SLIDERS: usize = 4;
 
-/// Stiffness of a gear's teeth once they touch, N·m/rad: so high that winding up is no second effect in
+/// Stiffness of a gear's teeth once they touch, N·m/rad: so high that winding up is not a second effect in
 /// addition to the play.
 const TEETH: f64 = 2.0e5;
 

@@ -42,7 +42,7 @@ impl From<DcfError> for ImportError {
     }
 }
 
-/// Says something of a file that is no error.
+/// Says something of a file that is not an error.
 fn say(note: &str) {
     tracing::warn!(target: "powerball::bus", "{note}");
 }

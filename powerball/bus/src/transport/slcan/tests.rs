@@ -194,7 +194,7 @@ fn a_frame_that_is_refused_for_errors_on_the_bus_means_bus_off() {
     port.says(b"F80\r");
     later.send(&frame(1)).unwrap();
     assert_eq!(first(&mut later, 1), [Event::BusOff]);
-    // Flags that are clear again are no sign that it is back.
+    // Flags that are clear again are not a sign that it is back.
     assert_eq!(events(&mut bus, 600), []);
     assert_eq!(bus.send(&frame(1)), Err(BusError::Off));
 }
@@ -269,7 +269,7 @@ fn a_flush_ends_half_a_frame() {
     bus.flush();
     bus.send(&frame(0x000)).unwrap();
     assert_eq!(port.heard_until("t00020102").last().unwrap(), "t00020102");
-    // Its own refusal is no news; that of a later frame is.
+    // Its own refusal is not news; that of a later frame is.
     assert_eq!(events(&mut bus, 300), []);
     bus.send(&frame(0x777)).unwrap();
     assert_eq!(first(&mut bus, 1), [Event::NotSent]);

@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 /// Show what is in log files and what they are taken to be: topics, columns, units, rates, gaps, doubts;
 /// with --out as a page with figures.
 ///
-/// CSV, Parquet, LeRobot datasets, MCAP, bags of ROS 1 and 2 (also their folders), npz, npy, mat and HDF5. With an arm also the log that `identify` would read. Exit
-/// code 1 where a file is no log of that arm.
+/// CSV, Parquet, LeRobot datasets, MCAP, bags of ROS 1 and 2 (also their folders), npz, npy, mat and HDF5.
+/// With an arm also the log that `identify` would read. Exit code 1 where a file is not a log of that arm.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Examples:\n  powerball log recording.mcap --out looked\n  powerball log bag_0.db3 --arm arm.toml --map \
@@ -107,7 +107,7 @@ impl LogCommand {
         }
         match &file.log {
             Some(log) => write(log, arm, self.model.as_deref(), out),
-            // Why it is no log is reported below.
+            // Why it is not a log is reported below.
             None => Ok(()),
         }
     }

@@ -62,7 +62,7 @@ impl ProfileCommand {
     }
 }
 
-/// Why a TOML's bytes are no text.
+/// Why a TOML's bytes are not text.
 fn no_text(bytes: &[u8]) -> &'static str {
     match bytes {
         [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] => "is UTF-16; TOML is UTF-8: save it as UTF-8",

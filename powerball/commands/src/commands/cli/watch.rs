@@ -298,7 +298,7 @@ impl WatchCommand {
     }
 }
 
-/// A longer line is no row, bytes.
+/// A longer line is not a row, bytes.
 const LONGEST_LINE: u64 = 1 << 20;
 
 /// The lines of a stream; none is held that is longer than a row can be.

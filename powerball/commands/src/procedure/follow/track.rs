@@ -76,8 +76,8 @@ impl<const N: usize> Track<N> {
     }
 }
 
-/// The delay, s, common to all joints and tracks, with which they follow a path best: drives that interpolate are late by
-/// whole cycles, and that is no error.
+/// The delay, s, common to all joints and tracks, with which they follow a path best: drives that interpolate
+/// are late by whole cycles, and that is not an error.
 #[must_use]
 pub fn common_delay<const N: usize>(tracks: &[&Track<N>], path: &Path<N>) -> f64 {
     let period = path.motion().period;

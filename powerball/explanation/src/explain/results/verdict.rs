@@ -278,7 +278,7 @@ impl Evidence {
     #[must_use]
     pub fn features(&self) -> [f64; FEATURES] {
         let margin = within(self.margin, [1.0, LARGEST_MARGIN]).ln();
-        // By what is gone, since what is no number counts as the lower end.
+        // By what is gone, since what is not a number counts as the lower end.
         let leftover = 1.0 - within(1.0 - self.leftover, [0.0, 1.0]);
         [1.0, f64::from(u8::from(self.alike)), margin, leftover]
     }

@@ -131,8 +131,8 @@ impl<'c> Screen<'c> {
         let (base, rest) = products.without_base(&self.solver);
         let score: Vec<f64> =
             products.right.iter().zip(&base).map(|(own, shares)| own - dot(shares, &self.slope)).collect();
-        // A column that the base can imitate wholly is no candidate; nor is one that this arm never feels, as
-        // a planar arm a force across its plane.
+        // A column that the base can imitate wholly is not a candidate; nor is one that this arm never feels,
+        // as a planar arm a force across its plane.
         let solver = products.solver(&rest);
         if solver.kept().is_empty() {
             return None;

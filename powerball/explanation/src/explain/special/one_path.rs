@@ -24,7 +24,7 @@ pub(crate) fn repeats(rule: &Rule, data: &Data<'_>, other: &Data<'_>) -> bool {
 fn same_path(rule: &Rule, a: &Recording, b: &Recording) -> bool {
     let n = a.dof;
     let samples = a.len().min(b.len());
-    // A short stretch that agrees is no path.
+    // A short stretch that agrees is not a path.
     if samples * 2 < a.len().max(b.len()) || (a.rate - b.rate).abs() > 0.05 * a.rate {
         return false;
     }

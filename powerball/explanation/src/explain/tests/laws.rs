@@ -1,4 +1,4 @@
-//! Torques that are no effect of the library: reported as a formula, and no name is given in their place.
+//! Torques that are not an effect of the library: reported as a formula, and no name is given in their place.
 
 use super::numbered;
 use super::plant::{Noise, Truth, arm, record};
@@ -65,8 +65,8 @@ fn nothing_is_made_a_law_that_is_noise_or_has_a_name() {
     assert_eq!(names, ["spring"]);
 }
 
-/// A smooth bump over two positions is no name: parts of it look like ripple and a constant torque, and one surface has
-/// all of it.
+/// A smooth bump over two positions is not a name: parts of it look like ripple and a constant torque, and
+/// one surface has all of it.
 #[test]
 fn a_bump_of_two_positions_is_a_surface_and_no_name() {
     let square = |x: f64| x * x;

@@ -64,8 +64,8 @@ fn one_missing_effect_is_named_with_its_figures() {
     }
 }
 
-/// Teeth that pass faster than the band holds for most of the time. Without what passes more slowly it is no ripple of the
-/// joint: its law would raise the error there.
+/// Teeth that pass faster than the band holds for most of the time. Without what passes more slowly it is not
+/// a ripple of the joint: its law would raise the error there.
 #[test]
 fn ripple_above_the_band_is_named() {
     let body = RigidArm::new(&arm()).unwrap();

@@ -343,7 +343,7 @@ fn every_log_says_by_itself_when_a_payload_is_taken_up() {
             approx::assert_relative_eq!(parameters["start_time"][k].as_f64().unwrap(), start, epsilon = 0.15);
         }
         approx::assert_relative_eq!(parameters["mass"].as_f64().unwrap(), PAYLOAD, max_relative = 0.05);
-        // The jerk with which it is taken up is no law of the model.
+        // The jerk with which it is taken up is not a law of the model.
         near_the_floor(&explained, 1.35);
     }
 }

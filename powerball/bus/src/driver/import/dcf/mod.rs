@@ -2,7 +2,7 @@
 //! latin-1, UTF-8 or UTF-16 with its mark, any case, `$NODEID + 0x80` anywhere in a number, names that repeat, comments behind values,
 //! arrays whose parts share one section (`CompactSubObj`), types that the file defines itself.
 //!
-//! Not read: `[DummyUsage]` (types that fill a PDO are no objects) and `CompactPDO` (PDOs without sections).
+//! Not read: `[DummyUsage]` (types that fill a PDO are not objects) and `CompactPDO` (PDOs without sections).
 
 #[cfg(test)]
 mod python;
