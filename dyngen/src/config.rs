@@ -176,7 +176,7 @@ impl Config {
     /// The files that [`Config::write`] writes, with their texts: `file`, and in C the header of the same name.
     ///
     /// # Errors
-    /// As [`Config::source`].
+    /// Those of [`Config::source`].
     pub fn texts(&self, file: &Path) -> Result<Vec<(PathBuf, String)>, GenerateError> {
         let files = self.files(file)?;
         let (model, options) = self.model()?;
@@ -211,10 +211,11 @@ impl Config {
         Ok((model, options))
     }
 
-    /// Why no real arm can have the values that are baked in, in words; empty where there are none, or one can.
+    /// The reasons why no real arm can have the values that are baked in; empty if there are none, or if one
+    /// can.
     ///
     /// # Errors
-    /// As [`Config::source`].
+    /// Those of [`Config::source`].
     pub fn warnings(&self) -> Result<Vec<String>, GenerateError> {
         let Some(file) = &self.values else { return Ok(Vec::new()) };
         let (model, options) = self.model()?;
@@ -259,7 +260,7 @@ impl Config {
     /// all.
     ///
     /// # Errors
-    /// As [`Config::source`], and where a file cannot be written.
+    /// Those of [`Config::source`], and where a file cannot be written.
     pub fn write(&self, file: &Path) -> Result<(), GenerateError> {
         for (file, text) in self.texts(file)? {
             let mut partial = file.clone().into_os_string();
@@ -273,7 +274,7 @@ impl Config {
     /// For a build script: writes `name` into `OUT_DIR`, and sets when cargo runs it again.
     ///
     /// # Errors
-    /// As [`Config::write`].
+    /// Those of [`Config::write`].
     pub fn build(&self, name: &str) -> Result<(), GenerateError> {
         for file in std::iter::once(&self.arm).chain(&self.values) {
             println!("cargo::rerun-if-changed={}", file.display());

@@ -51,7 +51,7 @@ impl Possibility {
 /// Judges the values of a set's parameters, in the set's order.
 ///
 /// # Errors
-/// As [`Model::function`].
+/// Those of [`Model::function`].
 pub fn check(model: &Model, kind: SetKind, values: &[f64]) -> Result<Possibility, Error> {
     let arm = model.arm();
     let set = model.set(kind)?;

@@ -74,7 +74,7 @@ impl Evaluator {
     /// Builds, proves and compiles a function for a set.
     ///
     /// # Errors
-    /// As [`Model::function`].
+    /// Those of [`Model::function`].
     pub fn new(model: &Model, function: Function, kind: SetKind) -> Result<Evaluator, Error> {
         let built = model.function(function, kind)?;
         let constants = &model.symbols().angles;

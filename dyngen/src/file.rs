@@ -21,7 +21,7 @@ pub fn regular(path: &Path) -> io::Result<()> {
 /// Opens a file.
 ///
 /// # Errors
-/// As [`regular`].
+/// Those of [`regular`].
 pub fn open(path: &Path) -> io::Result<File> {
     regular(path)?;
     File::open(path)
@@ -30,7 +30,7 @@ pub fn open(path: &Path) -> io::Result<File> {
 /// The bytes of a file.
 ///
 /// # Errors
-/// As [`regular`].
+/// Those of [`regular`].
 pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     regular(path)?;
     std::fs::read(path)

@@ -172,7 +172,7 @@ impl Model {
     /// a pass.
     ///
     /// # Errors
-    /// As [`Model::function`].
+    /// Those of [`Model::function`].
     pub fn function_after(
         &self,
         function: Function,
@@ -185,7 +185,7 @@ impl Model {
     /// A function with the values of a set's parameters baked in, proven like any other.
     ///
     /// # Errors
-    /// As [`Model::function`], and [`Error::Values`] where the values do not fit the set.
+    /// Those of [`Model::function`], and [`Error::Values`] where the values do not fit the set.
     pub fn baked_function(
         &self,
         function: Function,

@@ -37,7 +37,7 @@ impl Values {
     /// Reads values from text; `file` names it in errors.
     ///
     /// # Errors
-    /// As [`Values::read`].
+    /// Those of [`Values::read`].
     pub fn parse(text: &str, file: &str) -> Result<Values, Diagnostics> {
         let json: Value = serde_json::from_str(text).map_err(|e| {
             let message = format!("not valid JSON: {e}");
@@ -152,7 +152,7 @@ impl Values {
     /// values of the arm's parameters.
     ///
     /// # Errors
-    /// As [`Values::of_set`].
+    /// Those of [`Values::of_set`].
     pub fn recognise(&self, model: &Model) -> Result<(SetKind, Vec<f64>), Diagnostics> {
         let covered = |set: &&ParameterSet| set.names().iter().all(|n| self.by_name.contains_key(n));
         let order = [SetKind::Full, SetKind::Published, SetKind::Minimal, SetKind::Symbolic];

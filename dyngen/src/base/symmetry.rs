@@ -32,7 +32,7 @@ pub struct Symmetry {
 /// Each declared symmetry of an arm, by itself, for the numbers in its file.
 ///
 /// # Errors
-/// As [`Sets::derive`].
+/// Those of [`Sets::derive`].
 pub fn symmetries(arm: &Arm, sets: &Sets) -> Result<Vec<Symmetry>, Unproven> {
     let field = &sets.field;
     let mut without: Arm = arm.clone();

@@ -167,9 +167,9 @@ fn mirrored(chain: &Chain, mut matrix: Vec<Expr>) -> Vec<Expr> {
     matrix
 }
 
-/// Fills the stage's own entries, in the joints' coordinates, and gives what each of the stage's coordinates
-/// makes of momentum, about the first origin in the axes before the stage, and the composite of all links
-/// from the stage on.
+/// Fills the stage's own entries, in the joints' coordinates, and gives the momentum from each of the stage's
+/// coordinates, about the first origin in the axes before the stage, and the composite of all links from the
+/// stage on.
 fn revolute(
     b: &Builder,
     chain: &Chain,

@@ -98,7 +98,7 @@ pub fn coriolis_matrix(b: &Builder, chain: &Chain, bodies: &[LinkBody], velociti
     matrix
 }
 
-/// Adds what the rotor of a member of a stage makes of C where its motor turns with several joints.
+/// Adds the contribution to C of the rotor of a member of a stage whose motor turns with several joints.
 fn add_coupled_motor(
     b: &Builder,
     chain: &Chain,

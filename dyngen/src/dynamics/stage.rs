@@ -173,7 +173,7 @@ impl Member {
         Some(row.iter().fold(Expr::ZERO, |sum, (j, factor)| b.add(&sum, &b.mul(factor, &of_joint[*j]))))
     }
 
-    /// Adds to the joints' torques what a torque of its motor about the chain's z makes of them.
+    /// Adds the joints' torques from a torque of its motor about the chain's z.
     pub fn add_coupled_torque(&self, b: &Builder, torque: Expr, torques: &mut [Expr]) {
         for (joint, factor) in self.coupled.iter().flatten() {
             torques[*joint] = b.add(&torques[*joint], &b.mul(factor, &torque));

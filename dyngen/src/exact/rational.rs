@@ -14,7 +14,7 @@ const LONGEST_LITERAL: usize = 80;
 
 /// Reads an integer, a decimal with or without exponent, or a fraction `p/q`, exactly.
 ///
-/// Returns the reason as text where `text` is none of these.
+/// Returns the reason as text if `text` is none of these.
 pub fn parse_rational(text: &str) -> Result<Rational, String> {
     let text = text.trim();
     if text.len() > LONGEST_LITERAL {

@@ -116,7 +116,7 @@ struct Actuators {
 }
 
 impl Actuators {
-    /// Adds the effects of a joint, whose torque acts on what `turns` says.
+    /// Adds the effects of a joint, whose torque acts on the part named by `turns`.
     fn add(&mut self, joint: &str, turns: &str, effects: Motors) {
         self.left_out.extend(effects.left_out.into_iter().map(|why| format!("joint '{joint}': {why}")));
         let placed = |motor| Placed { joint: joint.to_string(), turns: turns.to_string(), motor };

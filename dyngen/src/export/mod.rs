@@ -20,7 +20,7 @@ use crate::import::{ImportError, Options, Source};
 /// A URDF or a MuJoCo model from the disk with what is known of the arm in it, whichever it is.
 ///
 /// # Errors
-/// As [`urdf()`] and [`mjcf()`], with the files and lines of what the model includes.
+/// Those of [`urdf()`] and [`mjcf()`], with the files and lines of what the model includes.
 pub fn source(source: &Source, arm: &Arm, known: &Known, options: &Options) -> Result<Exported, ImportError> {
     let write = if source.is_mjcf() { mjcf } else { urdf };
     let exported = write(&source.text, &source.file, arm, known, options);

@@ -10,7 +10,8 @@ use crate::import::text::plain;
 use crate::import::urdf::Robot;
 use nalgebra::Matrix3;
 
-/// How far the arm's axes may be from the file's, m and rad: what taking rounded numbers as meant makes.
+/// Largest distance of the arm's axes from the file's, m and rad: exact numbers in place of rounded ones
+/// cause it.
 const APART: f64 = 5e-3;
 
 /// The share of one link of the description.

@@ -10,7 +10,8 @@ pub struct Preparation {
 }
 
 impl Preparation {
-    /// Takes what depends on parameters alone out of a graph: what is left reads it as [`Input::Prepared`].
+    /// Removes the values that depend on parameters alone from a graph: the rest reads them as
+    /// [`Input::Prepared`].
     pub fn take_out(&mut self, graph: &Graph, outputs: &[Expr]) -> (Graph, Vec<Expr>) {
         let holds = graph.holds();
         let prepared = |node: usize| holds[node].parameters && !holds[node].state;
@@ -37,7 +38,7 @@ impl Preparation {
         (rest.finish(), outputs)
     }
 
-    /// A prepared value as an input of what is left.
+    /// A prepared value as an input of the rest.
     fn read(&mut self, rest: &Builder, value: Expr) -> Expr {
         let found = self.values.iter().position(|v| *v == value.positive());
         let index = found.unwrap_or_else(|| {

@@ -76,9 +76,8 @@ fn sum(b: &Builder, mut terms: Vec<Term>) -> Expr {
     })
 }
 
-/// The factor of most products with the terms that share it, where two do; of equals the first. What would be
-/// left of them depends on the state but for one: sums of parameters would have to be prepared in addition to
-/// what is.
+/// The factor of most products with the terms that share it, where two do; of equals the first. All remaining
+/// terms but one depend on the state: otherwise further sums of parameters would have to be prepared.
 fn most_shared(terms: &[Term]) -> Option<(Factor, Vec<usize>)> {
     let mut sharing: BTreeMap<Expr, (bool, Vec<usize>, bool)> = BTreeMap::new();
     for (k, term) in terms.iter().enumerate().filter(|(_, term)| term.factors.len() > 1) {

@@ -19,7 +19,7 @@ pub struct Findings<'a> {
     pub resting: Vec<JointNumber>,
     /// Joints that are predicted no better than by the mean of their torque.
     pub useless: Vec<JointNumber>,
-    /// Whether a number of the result is none.
+    /// Whether a number of the result is not finite.
     pub not_finite: bool,
     /// The share of poses at which B(q) is not positive definite.
     pub indefinite: f64,

@@ -82,7 +82,7 @@ pub fn arm() -> Result<Arm, Diagnostics> {
 /// encoders of 0.001° and torque noise.
 ///
 /// # Errors
-/// As [`arm`].
+/// Those of [`arm`].
 pub fn plant() -> Result<Plant, Diagnostics> {
     build(Chain::new(&arm()?))
 }
@@ -90,7 +90,7 @@ pub fn plant() -> Result<Plant, Diagnostics> {
 /// The arm of [`plant`] with its base mounted otherwise: gravity in the base frame, m/s².
 ///
 /// # Errors
-/// As [`arm`].
+/// Those of [`arm`].
 pub fn mounted(gravity: [f64; 3]) -> Result<Plant, Diagnostics> {
     let mut chain = Chain::new(&arm()?);
     chain.gravity = gravity.into();
@@ -117,7 +117,7 @@ const RATED_115: u32 = 150;
 /// The drives of the arm: nodes and the scale of 0x6077 as the driver knows them, limits of the arm file.
 ///
 /// # Errors
-/// As [`arm`].
+/// Those of [`arm`].
 pub fn modules() -> Result<Vec<Module>, Diagnostics> {
     let joints = arm()?.joints;
     Ok(joints
@@ -149,7 +149,7 @@ const VENDOR: u32 = 0x0000_015E;
 /// The virtual LWA 4P for a bus: [`plant`] with its six drives at `start`, rad.
 ///
 /// # Errors
-/// As [`arm`].
+/// Those of [`arm`].
 pub fn setup(start: [f64; 6], seed: u64) -> Result<Setup, Diagnostics> {
     Ok(Setup { plant: plant()?, modules: modules()?, start: start.to_vec(), age: 0.0, seed })
 }

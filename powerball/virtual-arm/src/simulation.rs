@@ -97,7 +97,7 @@ impl Simulation {
         &self.plant
     }
 
-    /// Sets the time: what warms or begins does so as if it were `time` s.
+    /// Sets the time: effects that warm up or begin do so as if it were `time` s.
     pub fn set_time(&mut self, time: f64) {
         (self.time, self.stale) = (time, 0);
     }
@@ -354,7 +354,7 @@ impl Servo {
         Servo { gains, held: 0.0 }
     }
 
-    /// Forgets what the integrator holds.
+    /// Clears the integrator.
     pub fn reset(&mut self) {
         self.held = 0.0;
     }

@@ -22,7 +22,7 @@ impl Emcy {
         Frame::fixed(Cob::Emcy(node).id(), [low, high, self.register, a, b, c, d, e])
     }
 
-    /// Node and message in `frame`; `None` where it is not an emergency, or has not eight bytes.
+    /// Node and message in `frame`; `None` if it is not an emergency, or does not have eight bytes.
     pub fn decode(frame: &Frame) -> Option<(NodeId, Emcy)> {
         match (Cob::of(frame)?, frame.bytes()) {
             (Cob::Emcy(node), &[low, high, register, a, b, c, d, e]) => {

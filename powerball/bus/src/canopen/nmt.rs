@@ -103,7 +103,7 @@ impl State {
         Frame::fixed(Cob::Heartbeat(node).id(), [self.code()])
     }
 
-    /// Node and state in a heartbeat frame; `None` where `frame` is none, or has not one byte.
+    /// Node and state in a heartbeat frame; `None` if `frame` is not a heartbeat, or does not have one byte.
     pub fn decode(frame: &Frame) -> Option<(NodeId, State)> {
         match (Cob::of(frame)?, frame.bytes()) {
             (Cob::Heartbeat(node), &[code]) => Some((node, State::from_code(code))),

@@ -33,7 +33,7 @@ impl Entry {
     }
 }
 
-/// Why a mapping cannot be.
+/// The reason why a mapping is impossible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MappingError {
     /// More than eight objects.
@@ -142,7 +142,7 @@ impl Mapping {
     }
 
     /// Each object with its raw value (not sign extended: the caller that mapped it knows its type; see
-    /// [`sign_extend`]). `None` where `bytes` has not exactly the mapped length.
+    /// [`sign_extend`]). `None` if `bytes` does not have exactly the mapped length.
     pub fn unpack<'a>(&'a self, bytes: &'a [u8]) -> Option<impl Iterator<Item = (Entry, u32)> + 'a> {
         if bytes.len() != self.len() {
             return None;

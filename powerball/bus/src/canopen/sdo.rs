@@ -198,7 +198,7 @@ impl Request {
     /// The request in a frame's bytes.
     ///
     /// # Errors
-    /// Where they are none known here.
+    /// If they are not a command known here.
     pub fn decode(bytes: &[u8]) -> Result<Request, Malformed> {
         let Parts { specifier, command, object, data, toggle, chunk, last } = parts(bytes)?;
         Ok(match specifier {
@@ -227,7 +227,7 @@ impl Response {
     /// The response in a frame's bytes.
     ///
     /// # Errors
-    /// Where they are none known here.
+    /// If they are not a command known here.
     pub fn decode(bytes: &[u8]) -> Result<Response, Malformed> {
         let Parts { specifier, command, object, data, toggle, chunk, last } = parts(bytes)?;
         Ok(match specifier {

@@ -229,7 +229,7 @@ impl<const N: usize> Driver<N> {
                 Err(deviation)
             };
         }
-        // A drive need not tell it; the profile's limit counts then.
+        // A drive need not report it; the profile's limit is used then.
         if object == objects::MAX_CURRENT {
             let stated = number.ok().filter(|n| (1..=u32::from(u16::MAX)).contains(n));
             joint.current_limit =
@@ -467,7 +467,7 @@ impl<const N: usize> Driver<N> {
     }
 }
 
-/// Whether a drive may be left as it is until it is enabled.
+/// Whether a drive needs no change until it is enabled.
 fn is_off(state: State) -> bool {
     matches!(state, State::SwitchOnDisabled | State::ReadyToSwitchOn | State::SwitchedOn)
 }

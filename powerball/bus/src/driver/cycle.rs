@@ -36,8 +36,8 @@ impl<const N: usize> Driver<N> {
     /// whenever the arm does not run.
     ///
     /// # Errors
-    /// As [`Driver::set`]; and if a torque is NaN, more than the joint has, or further from the last one than
-    /// [`Reactions::current_step`](super::profile::Reactions::current_step) of that.
+    /// Those of [`Driver::set`]; and if a torque is NaN, more than the joint has, or further from the last
+    /// one than [`Reactions::current_step`](super::profile::Reactions::current_step) of that.
     pub fn set_with_torque(&mut self, setpoints: &[f64; N], torques: &[f64; N]) -> Result<(), Rejection> {
         if self.phase != Phase::Running {
             return Err(Rejection::NotRunning);

@@ -106,11 +106,12 @@ impl Guard<'_> {
     }
 }
 
-/// Whether the driver will take a whole path in interpolated position mode, sample by sample, from rest at its first
-/// sample to rest at its last: the same guard that each set-point passes when it leaves.
+/// Whether the driver accepts a whole path in interpolated position mode, sample by sample, from rest at its
+/// first sample to rest at its last. The guard is the one that checks each set-point when it is sent.
 ///
 /// # Errors
-/// The first sample, from 0, that it will not take, and why. One past the last: it does not end at rest.
+/// The first sample, from 0, that it does not accept, and the reason. One past the last means that the path
+/// does not end at rest.
 pub fn check_path<const N: usize>(
     profile: &Profile<N>,
     path: impl IntoIterator<Item = [f64; N]>,

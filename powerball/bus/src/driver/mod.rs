@@ -91,7 +91,7 @@ pub use torque_mode::Tracking;
 /// The phases of the driver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Phase {
-    /// Nothing: no frame leaves.
+    /// The driver is idle: no frame is sent.
     Idle,
     /// Nothing is sent: another master would be heard.
     Listening,

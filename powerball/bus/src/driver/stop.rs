@@ -49,9 +49,9 @@ impl<const N: usize> Driver<N> {
         }
     }
 
-    /// Stops the arm because the program was asked to end: as [`Driver::stop`], and latched, so that nothing moves
-    /// again. Where a joint may have torque quick stop leaves at once in every phase, also where the arm is being stopped
-    /// already: its brakes stay closed then. Once is enough.
+    /// Stops the arm because the program was asked to end: like [`Driver::stop`], but latched, so that
+    /// nothing moves again. If a joint may have torque, quick stop is sent at once in every phase, also if
+    /// the arm is being stopped already: its brakes stay closed then. One call is enough.
     pub fn interrupt(&mut self, now: Micros, tx: &mut impl Transmit) {
         self.now = now;
         if self.interrupted || self.phase == Phase::Idle {
@@ -99,8 +99,8 @@ impl<const N: usize> Driver<N> {
         }
     }
 
-    /// The first cause stays. Only missing data gives way to what explains it: a node that restarts is missed
-    /// before it says so. A cause that needs a restart is never forgotten.
+    /// The first cause stays. Only missing data is replaced by a cause that explains it: data of a node that
+    /// restarts is missing before the node reports it. A cause that needs a restart is never forgotten.
     fn latch(&mut self, cause: Cause) {
         self.note(cause);
         let tells_more = |first| match first {

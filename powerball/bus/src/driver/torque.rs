@@ -76,7 +76,7 @@ impl<const N: usize> TorqueGuard<N> {
         }
         let torques = self.torque(&q, &dq, &ddq);
         for (j, (torque, limits)) in torques.iter().zip(&profile.joints).enumerate() {
-            // A model that gives no number says nothing in favour of the set-point.
+            // A model that gives NaN does not support the set-point.
             if torque.abs().partial_cmp(&limits.torque).is_none_or(core::cmp::Ordering::is_gt) {
                 return Err(Rejection::Torque(JointNumber::from_index(j), *torque, limits.torque));
             }
@@ -109,7 +109,7 @@ impl Demand {
         Demand { points: [value; KEPT] }
     }
 
-    /// The next set-point leaves.
+    /// Records the set-point that is sent next.
     pub(super) fn push(&mut self, value: f64) {
         self.points.rotate_right(1);
         if let Some(newest) = self.points.first_mut() {

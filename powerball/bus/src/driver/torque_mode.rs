@@ -1,8 +1,8 @@
-//! The guard of current mode: a joint that does not move as its torque says, or measurements that no joint can have.
+//! The guard of current mode: it detects a joint that does not move as its torque predicts, and measurements
+//! that are impossible for a joint.
 //!
-//! In the other modes a drive holds its joint, and a wrong measurement is an error that can be seen. In
-//! current mode the caller's law holds it: what is measured wrong becomes a motion. So each joint is checked
-//! in every cycle:
+//! In the other modes a drive holds its joint, and a wrong measurement is a visible error. In current mode
+//! the caller's law holds it: a wrong measurement becomes a motion. So each joint is checked in every cycle:
 //!
 //! * a velocity that no joint can have is not used, and stops the arm when it stays;
 //! * position and integrated velocity that drift apart: one of the two is wrong;
@@ -86,7 +86,7 @@ impl Guarded {
         newest.at.saturating_sub(oldest.at) as f64 * 1e-6
     }
 
-    /// The next sample, `limit` rad of slip being let through; the slip where it is more.
+    /// Takes the next sample and tolerates `limit` rad of slip; returns the slip if it is more.
     fn take(&mut self, sample: Sample, period: f64, profile: &JointProfile, limits: [f64; 2]) -> Option<f64> {
         let last = self.samples[0];
         let time = sample.at.saturating_sub(last.at) as f64 * 1e-6;
@@ -116,7 +116,7 @@ impl<const N: usize> Driver<N> {
     /// farther from there than it may be stops the arm.
     ///
     /// # Errors
-    /// As [`Driver::set`].
+    /// Those of [`Driver::set`].
     pub fn set_tracked(&mut self, currents: &[f64; N], tracking: &Tracking<N>) -> Result<(), Rejection> {
         self.set(currents)?;
         let cycle = self.counters.cycles;

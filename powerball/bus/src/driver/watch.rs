@@ -69,7 +69,7 @@ impl<const N: usize> Driver<N> {
         }
     }
 
-    /// Each statusword of a joint that should have torque: the bits that tell whether it can use it.
+    /// Checks each statusword of a joint that should have torque: the bits that show whether it can use it.
     pub(super) fn watch_status(&mut self, j: usize, tx: &mut impl Transmit) {
         let node = self.node(j);
         let (running, control) = (self.phase == Phase::Running, self.control);

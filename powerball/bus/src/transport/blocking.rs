@@ -45,7 +45,7 @@ pub fn read(bus: &mut dyn Bus, node: NodeId, object: Object) -> Result<Value, Tr
 /// Writes an object of a node.
 ///
 /// # Errors
-/// As [`read`].
+/// Those of [`read`].
 pub fn write(bus: &mut dyn Bus, node: NodeId, object: Object, value: Value) -> Result<(), TransferError> {
     write_within(bus, node, object, value, TIMEOUT)
 }

@@ -49,7 +49,8 @@ impl Interrupt {
         self.asked.load(Ordering::SeqCst)
     }
 
-    /// Whether an arm is moved from now on. A process that was asked to end closes its files without being asked twice.
+    /// Sets whether an arm is moved from now on. A process that was asked to end closes its files after the
+    /// first request.
     pub(super) fn guard(&self, moved: bool) {
         self.idle.store(!moved && !self.is_asked(), Ordering::SeqCst);
     }

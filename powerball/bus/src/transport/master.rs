@@ -13,7 +13,7 @@ use std::fmt;
 /// For the arm to come to rest with closed brakes and without torque, µs.
 const STOP: Micros = 5_000_000;
 
-/// A [`Driver`] with the [`Bus`] that its arm is on.
+/// A [`Driver`] with the [`Bus`] of its arm.
 ///
 /// However a program leaves it, by an error, a panic or a signal ([`Master::with_interrupt`]), the arm is
 /// stopped: a master that is dropped while joints may have torque sends quick stop, closes the brakes, takes
@@ -45,7 +45,7 @@ pub enum Moment {
     Over,
 }
 
-/// Why an arm is not where it was asked to be.
+/// The reason why the arm did not reach the requested state.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ArmError {
     /// The driver does not do it.
@@ -156,7 +156,7 @@ impl<B: Bus, const N: usize> Master<B, N> {
         &self.bus
     }
 
-    /// The bus, for what the driver does not do.
+    /// The bus, for transfers that the driver does not make.
     pub fn bus_mut(&mut self) -> &mut B {
         &mut self.bus
     }
@@ -253,7 +253,7 @@ impl<B: Bus, const N: usize> Master<B, N> {
     /// Stops the arm and waits until it stands with closed brakes and without torque.
     ///
     /// # Errors
-    /// As [`wait_for`](Self::wait_for).
+    /// Those of [`wait_for`](Self::wait_for).
     pub fn stop(&mut self) -> Result<(), ArmError> {
         self.bring_to_rest()?;
         self.check()

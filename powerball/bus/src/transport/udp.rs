@@ -37,7 +37,7 @@ impl UdpMulticast {
     /// is on it can speak: fence it.
     ///
     /// # Errors
-    /// As [`open`](Self::open), and where this machine has no such interface.
+    /// Those of [`open`](Self::open), and where this machine has no such interface.
     pub fn open_on(group: SocketAddr, interface: Option<&Interface>) -> Result<Self, BusError> {
         let failed = |what: &'static str| {
             move |e: std::io::Error| {

@@ -25,7 +25,7 @@ pub type ModelArm = ModelOnArm<6>;
 /// Reads a model of the arm of a file, with its effects or without.
 ///
 /// # Errors
-/// As [`ModelOnArm::new`]; an arm of another number of joints.
+/// Those of [`ModelOnArm::new`]; an arm of another number of joints.
 pub fn read(arm: &Arm, file: &Path, effects: bool) -> Result<ModelArm, String> {
     let (has, needs) = (arm.dof(), LWA4P.joints.len());
     if has != needs {

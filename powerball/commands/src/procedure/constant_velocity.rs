@@ -53,8 +53,8 @@ const SETTLE: f64 = 0.25;
 /// Rest between two ways, s.
 const REST: f64 = 0.3;
 
-/// Plans the experiment of a joint: at each velocity once in either direction over the same way, so that what
-/// gravity is left acts on both alike. `pose` holds the other joints.
+/// Plans the experiment of a joint: at each velocity once in either direction over the same path, so that the
+/// remaining gravity acts on both alike. `pose` holds the other joints.
 #[must_use]
 pub fn plan(joint: usize, pose: &[f64], bounds: Bounds, velocities: &[f64], period: f64) -> Plan {
     let [low, high] = bounds.position;

@@ -98,8 +98,8 @@ impl<const N: usize> Envelope<N> {
     /// Lets a motion through, or says why the arm must not go along it.
     ///
     /// # Errors
-    /// As [`check`](Self::check), and [`RecordError::Motion`] where it is not a motion of this arm at its
-    /// rate.
+    /// Those of [`check`](Self::check), and [`RecordError::Motion`] where it is not a motion of this arm at
+    /// its rate.
     pub fn clear(&self, profile: &Profile<N>, motion: Motion) -> Result<Cleared, RecordError> {
         let period = profile.period_seconds();
         if motion.dof() != N || motion.is_empty() {

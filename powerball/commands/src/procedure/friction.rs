@@ -98,8 +98,9 @@ pub fn log_file(folder: &Path, joint: usize) -> PathBuf {
     folder.join(format!("friction_{}.csv", joint + 1))
 }
 
-/// Runs a joint's experiment: goes to the pose and records the motion, which was let through before the arm was
-/// released. Gives its log, which may still be on its way to the disk: [close](Behind::close) it when the arm stands.
+/// Runs a joint's experiment: goes to the pose and records the motion, which was checked before the arm was
+/// released. Returns its log, which may not be completely written yet: [close](Behind::close) it when the arm
+/// stands.
 ///
 /// # Errors
 /// Where the arm stops, or the log cannot be written.
@@ -132,7 +133,7 @@ pub fn is_complete(path: &Path, experiment: &Experiment) -> bool {
 /// Where the log cannot be read or holds too little.
 pub fn analyse(model: &Model, experiment: &Experiment, path: &Path) -> Result<JointFriction, FrictionError> {
     let joint = experiment.plan.joint;
-    // What a reader of logs doubts (a joint that rests, say) is what this experiment does on purpose.
+    // This experiment has on purpose what a reader of logs doubts (a joint that rests, say).
     let log = read_log(path, model.arm(), &mut Vec::new()).map_err(FrictionError::Log)?;
     let points = experiment.plan.points(&log.t, &log.torque[joint]);
     let (laws, chosen) = choose(&points).ok_or_else(|| FrictionError::TooLittle(path.to_path_buf()))?;

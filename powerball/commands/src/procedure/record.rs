@@ -69,7 +69,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         self
     }
 
-    /// Brings an arm up: where it is is known then, its brakes are closed. No motion leaves `envelope`.
+    /// Brings an arm up: its position is then known, and its brakes are closed. No motion leaves `envelope`.
     ///
     /// # Errors
     /// Where driver, arm or bus refuse.
@@ -118,8 +118,8 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
     /// master, `None` where process data is missing.
     ///
     /// Where set-points came too late for their slot, the sample is given again and the motion is a cycle
-    /// longer: a joint is never asked to catch up. `forward`: the torque that each drive is given with a sample, N·m, where
-    /// there is one.
+    /// longer: a joint never has to catch up. `forward`: the torque that each drive is given with a sample,
+    /// N·m, where there is one.
     pub(super) fn follow(
         &mut self,
         motion: &Motion,
@@ -220,7 +220,7 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
     /// Goes that way and holds the position.
     ///
     /// # Errors
-    /// As [`way_to`](Self::way_to) and [`record`](Self::record).
+    /// Those of [`way_to`](Self::way_to) and [`record`](Self::record).
     pub fn go(&mut self, to: &[f64; N], share: f64, least: f64) -> Result<(), RecordError> {
         let way = self.way_to(to, share, least)?;
         self.follow(way.motion(), &[], |_, _| Ok(()))
@@ -322,7 +322,8 @@ fn beginning<const N: usize>(motion: &Motion) -> Option<[f64; N]> {
 /// anything is sent, the way to where it begins before the arm is enabled.
 ///
 /// # Errors
-/// As [`Recorder::enable`] and [`Recorder::record`], and [`RecordError::Barred`]; the arm has not moved then.
+/// Those of [`Recorder::enable`] and [`Recorder::record`], and [`RecordError::Barred`]; the arm has not moved
+/// then.
 pub fn record<B: Bus, const N: usize>(
     master: Master<B, N>,
     motion: &Motion,

@@ -45,7 +45,7 @@ pub struct Exponential {
     pub excess: f64,
     /// s
     pub time_constant: f64,
-    /// rms of what the curve leaves, N·m.
+    /// rms of the residual of the curve, N·m.
     pub rms: f64,
 }
 

@@ -29,8 +29,8 @@ impl<T: RealField + Copy> Default for Whitener<T> {
 }
 
 impl<T: RealField + Copy> Whitener<T> {
-    /// The signal less what its past says, over σ; `None` until [`ORDER`] samples came before it. One that is not finite
-    /// is as a gap.
+    /// The signal minus its prediction from its past, over σ; `None` until [`ORDER`] samples came before it.
+    /// A sample that is not finite counts as a gap.
     pub fn update(&mut self, colour: &Colour<T>, now: T) -> Option<T> {
         if !now.is_finite() {
             self.interrupt();
@@ -106,7 +106,7 @@ impl<T: RealField + Copy> Joint<T> {
             }
             return None;
         };
-        // Before anything was seen friction is what the model says, to within its range.
+        // Before the first sample, friction is that of the model, to within its range.
         let square = self.range * self.range;
         let share = square * self.products / (square * self.squares + T::one());
         let share = share.clamp(-self.range, self.range);

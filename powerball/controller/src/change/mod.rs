@@ -1,4 +1,5 @@
-//! Says when a torque model no longer holds: a sequential test of its innovations with a stated rate of false alarms.
+//! Detects when a torque model no longer holds: a sequential test of its innovations with a stated rate of
+//! false alarms.
 //!
 //! **Innovations** ([`Joint`]). A joint's residual r (measured less predicted torque) has a colour: r(t) − Σ
 //! a_k·r(t−k) is what its past could not predict, and over its deviation σ it is z. Friction wanders by ±

@@ -156,7 +156,7 @@ mod tests {
         let e = pose_error(&goal.pose, &arm.forward_kinematics(&q));
         let expected = arm.jacobian(&q).transpose() * law.stiffness.component_mul(&e) + arm.gravity(&q);
         assert!((law.torque(&arm, &rest, &goal).unwrap() - expected).norm() < 1e-9);
-        // A motion that leaves the tool where it is: damped, and the damping does not accelerate the tool.
+        // A motion that does not move the tool is damped, and the damping does not accelerate the tool.
         let j = arm.jacobian(&q);
         let rows = nalgebra::Matrix3x4::<f64>::from_fn(|i, k| j[([0, 1, 5][i], k)]);
         let still = rows.transpose() * (rows * rows.transpose()).try_inverse().unwrap() * rows;

@@ -59,8 +59,8 @@ impl<T: RealField + Copy, const N: usize> ContactDetector<T, N> {
             + self.rigid * rigid.abs()
     }
 
-    /// A cycle later: external torques of the observer, velocities, torques of the rigid arm. `None` without contact; what is
-    /// no number is none.
+    /// Called once a cycle with the external torques of the observer, the velocities, and the torques of the
+    /// rigid arm. `None` without contact; NaN does not count as contact.
     pub fn update(
         &mut self,
         external: &SVector<T, N>,

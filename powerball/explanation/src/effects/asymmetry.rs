@@ -76,7 +76,7 @@ impl Effect for Asymmetry {
         Class::Friction
     }
 
-    /// A zero of torques is none.
+    /// A zero of torques is not friction.
     fn is_friction(&self) -> bool {
         false
     }
@@ -123,7 +123,7 @@ impl Effect for Asymmetry {
     }
 }
 
-/// A direction that takes less than this share of a joint's motion is none.
+/// A direction with less than this share of a joint's motion does not count.
 const BOTH_WAYS: f64 = 0.05;
 
 /// Whether a joint turns either way: where it turns one way only, what differs with the direction is its friction.

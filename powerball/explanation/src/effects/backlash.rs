@@ -61,7 +61,7 @@ impl Effect for Backlash {
         Class::Friction
     }
 
-    /// Play is none.
+    /// Play is not friction.
     fn is_friction(&self) -> bool {
         false
     }

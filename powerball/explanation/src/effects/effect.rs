@@ -45,8 +45,8 @@ pub enum Part {
     Laws,
     /// A rigid arm with another value of a parameter that was assumed zero.
     Parameter(Parameter, f64),
-    /// A rigid arm under another gravity, m/s² in the base frame, and what all its parameters gain by what
-    /// that shows; empty for nothing.
+    /// A rigid arm under another gravity, m/s² in the base frame, and the changes of all its parameters that
+    /// this gravity shows; empty if there are none.
     Gravity([f64; 3], Vec<f64>),
     /// A body that a link may carry (the last one where none is named): mass in kg and centre in m, in its frame.
     Payload(f64, [f64; 3], Option<JointNumber>),
@@ -83,7 +83,7 @@ pub trait Effect: Sync {
         self.class() == Class::Event
     }
 
-    /// Whether it is a part of its joint's friction: what makes all of that larger makes it larger too.
+    /// Whether it is a part of its joint's friction: a change of the whole friction changes it too.
     fn is_friction(&self) -> bool {
         self.class() == Class::Friction
     }
@@ -109,14 +109,14 @@ pub trait Effect: Sync {
         None
     }
 
-    /// Whether it is a function of the path alone, so that logs which repeat one path cannot tell it from any
-    /// other misfit: positions, the torque of the rigid arm and the motion of other joints are; what warms or
-    /// rubs at the joint's own velocity is not.
+    /// Whether it is a function of the path alone, so that logs which repeat one path cannot distinguish it
+    /// from any other error: functions of positions, of the torque of the rigid arm and of the motion of
+    /// other joints are; warming and friction at the joint's own velocity are not.
     fn is_function_of_path(&self, _candidate: &Candidate, _data: &Data<'_>, _rule: &Rule) -> bool {
         matches!(self.class(), Class::Position | Class::Dynamics)
     }
 
-    /// Whether two of its candidates are the same thing twice, so that one excludes the other. By default an
+    /// Whether two of its candidates describe the same cause, so that one excludes the other. By default an
     /// effect is once on a joint: a delay of all joints and one of a single joint exclude each other.
     fn excludes(&self, a: &Candidate, b: &Candidate) -> bool {
         a.joints.iter().any(|j| b.joints.contains(j))

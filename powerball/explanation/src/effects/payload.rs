@@ -185,9 +185,9 @@ impl Effect for Payload {
         (c[0] > 0.0).then(|| candidate.with(Settings { com: Some(com()), ..*settings }))
     }
 
-    /// A payload may have been taken off before another log, or taken up and put down in it. Each log is asked by
-    /// itself; what the clocks say is overruled where it clearly says otherwise, as a log among the fitted ones
-    /// would.
+    /// A payload may have been taken off before another log, or taken up and put down in it. Each log is
+    /// tested by itself; the clocks are overruled if the log clearly contradicts them, as for the fitted
+    /// logs.
     fn seen_in(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
         let (data, another_log) = (context.data, context.rule.another_log);
         let taken = self.windows(context, candidate);

@@ -136,7 +136,7 @@ impl Effect for Temperature {
         [0.65, 0.8, 1.25, 1.5].map(near).to_vec()
     }
 
-    /// Friction that is negative in the cold or in the warmth of the logs is none.
+    /// Friction that is negative in the cold or in the warmth of the logs is impossible.
     fn possible(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> bool {
         let j = candidate.joints[0];
         let viscous = context.fit.friction(j.index())[4];

@@ -150,9 +150,9 @@ fn left(gram: &Mat<f64>, right: &[f64], square: f64, free: &[bool]) -> (f64, Vec
 struct Shows {
     /// χ² that the new log would add.
     evidence: f64,
-    /// How much better it would tell what only one of the names has, where the old logs leave that open: the
-    /// variances of its coefficients over those after the new log, less one. It decides where names predict
-    /// the same as fitted (a spring that does not grow is a constant torque).
+    /// How much better it would determine the terms that only one of the names has, if the old logs leave
+    /// them open: the variances of its coefficients over those after the new log, less one. It decides where
+    /// names predict the same as fitted (a spring that does not grow is a constant torque).
     narrows: f64,
     /// The difference that stays over the noise, by joint.
     by_joint: Vec<f64>,

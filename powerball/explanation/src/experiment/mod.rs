@@ -18,8 +18,8 @@ use powerball_logs::regression::RigidArm;
 /// Name of the trajectory's file next to explained.json.
 pub const TRAJECTORY: &str = "next_experiment.csv";
 
-/// Designs the experiment for what an explanation leaves open, and says so in its `next_experiment`; `None`
-/// where nothing is open or the arm file has no limits to move within.
+/// Designs the experiment for the open names of an explanation, and writes it to its `next_experiment`;
+/// `None` if nothing is open or the arm file has no limits to move within.
 pub fn propose(body: &RigidArm, explained: &mut Explained, options: &ExplainOptions<'_>) -> Option<Motion> {
     let open = explained.open.clone()?;
     options.progress.say("designing the experiment that distinguishes the open names");

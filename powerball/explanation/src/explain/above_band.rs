@@ -262,7 +262,7 @@ impl Velocities {
     }
 }
 
-/// Orders whose median is what noise leaves there, in cycles a turn.
+/// Range of orders whose median gives the noise there, in cycles per turn.
 const AROUND: f64 = 64.0;
 /// An order is examined if this share of a joint's samples passes it above the band.
 const LEAST_SHARE: f64 = 0.1;
@@ -382,7 +382,7 @@ impl Wave {
 /// Degrees of freedom that are as good as any number of them.
 const MANY: f64 = 1e6;
 
-/// Products of what is left above the band with cos(k·q) and sin(k·q).
+/// Products of the residual above the band with cos(k·q) and sin(k·q).
 fn products(traces: &[Trace], order: f64) -> [f64; 2] {
     let (mut cosine, mut sine) = (0.0, 0.0);
     for (q, value) in traces.iter().flat_map(|trace| trace.at_positions(&trace.twice)) {

@@ -245,7 +245,7 @@ impl<'s> Together<'s> {
         if first < last { first..last } else { 0..0 }
     }
 
-    /// A joint's weight: 1 over the variance of what the model leaves.
+    /// A joint's weight: 1 over the variance of the model's residual.
     pub(crate) fn weight(&self, joint: usize) -> f64 {
         self.weights[joint]
     }
@@ -288,7 +288,7 @@ impl<'s> Together<'s> {
         (square > 1e-6 * raw && score.is_finite()).then_some((theta, theta * score, base))
     }
 
-    /// The sums over blocks of all logs of a column times what would be left with it: their variation shows
+    /// The sums over blocks of all logs of a column times the residual with it: their variation shows
     /// how surely its coefficient is known.
     pub(crate) fn by_block(&self, asked: &Asked) -> Vec<f64> {
         let mut sums = Vec::new();

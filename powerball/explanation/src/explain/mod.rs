@@ -2,8 +2,8 @@
 //!
 //! [`explain_body`] runs all of it. `prepare` makes rows of the logs and fits the base model; the loop of
 //! `find` proposes one effect after the other (`step`) until nothing passes and nothing is taken back;
-//! `results` makes the model and the report of the `findings`. Each uses what stands above it here, never
-//! what stands below:
+//! `results` makes the model and the report of the `findings`. Each module uses those above it in this table,
+//! never those below:
 //!
 //! | | |
 //! |---|---|
@@ -97,7 +97,7 @@ fn find(Prepared { study, base, initial_fit }: Prepared<'_>) -> Findings<'_> {
                 study.say(&format!("step {}: the best candidate fits no better than chance", number + 1));
                 model.given_up.extend(candidates);
             }
-            // Only now is it known what is left after all that fits.
+            // Only now the residual after all fitting effects is known.
             Outcome::Nothing => {
                 if let Some(taken) = withhold(&study, &mut model, &mut history) {
                     study.say(&format!("{} is not named: {}", taken.effect.name(), taken.why));

@@ -40,8 +40,7 @@ pub(super) struct Model {
     pub(super) given_up: Vec<Candidate>,
     /// The base model with all of it, fitted.
     pub(super) fit: Fit,
-    /// Which of what was accepted makes the error on the logs to judge on larger, once that is evaluated on
-    /// this fit.
+    /// Which accepted effect raises the error on the validation logs, once that is evaluated on this fit.
     pub(super) harmful: OnceLock<Option<usize>>,
 }
 
@@ -231,7 +230,8 @@ impl Model {
         self.accepted.iter().filter(|a| a.above_band().is_none()).flat_map(columns).collect()
     }
 
-    /// Fits everything again, and asks the validation logs whether they have what is in some logs only.
+    /// Fits everything again, and tests whether the validation logs have the effects that are in some logs
+    /// only.
     pub(super) fn refit(&mut self, study: &Study<'_>) {
         self.fit = fitted_again(study, &mut self.accepted, &self.fit);
         self.harmful = OnceLock::new();

@@ -132,8 +132,8 @@ const LEAST: usize = 50;
 
 // The model that the search begins with.
 
-/// The base model, with what every arm may have where this one shows it plainly (see
-/// [`Effect::baseline`](crate::effects::Effect::baseline)): every effect is then judged together with that.
+/// The base model with the effects that every arm may have, if this one shows them clearly (see
+/// [`Effect::baseline`](crate::effects::Effect::baseline)): every effect is then judged together with them.
 pub(super) fn initial_model<'a>(base: Fit, study: &Study<'a>) -> Model {
     let plain = Model::new(base);
     // Per-joint fits have an offset already.

@@ -43,12 +43,12 @@ impl<'a> Study<'a> {
         self.data.recordings.iter().map(|r| r.len() as f64 / r.rate).sum()
     }
 
-    /// A model seen on the logs to fit, with what is left of them.
+    /// A model on the fitted logs, with its residual.
     pub(super) fn on_fitted<'c>(&'c self, fit: &'c Fit, residual: &'c [Vec<f64>]) -> Context<'c> {
         Context::new(&self.data, fit, residual, self.rule()).with(&self.made)
     }
 
-    /// A model seen on the validation set, with what is left of it.
+    /// A model on the validation set, with its residual.
     pub(super) fn on_validation<'c>(&'c self, fit: &'c Fit, residual: &'c [Vec<f64>]) -> Context<'c> {
         Context::new(&self.validation, fit, residual, self.rule()).with(&self.made_on_validation)
     }

@@ -143,7 +143,7 @@ impl Behind<'_> {
         )
     }
 
-    /// The function that tells a model whether the payload is held, where it knows one.
+    /// The function that sets whether a model holds the payload, if it has one.
     fn hold_payload(&self, prefix: &str) -> String {
         if !self.payload {
             return String::new();

@@ -44,8 +44,8 @@ pub struct JointColour {
 }
 
 impl JointColour {
-    /// Standard deviation of what the model leaves behind a low pass of `bandwidth` rad/s, and its mean at most, N·m; `rate` is
-    /// that of the rows, 1/s. Sums of the impulse response of both filters.
+    /// Standard deviation of the model's residual after a low pass of `bandwidth` rad/s, and its mean at
+    /// most, N·m; `rate` is that of the rows, 1/s. Sums of the impulse response of both filters.
     #[must_use]
     pub fn low_passed(&self, bandwidth: f64, rate: f64) -> [f64; 2] {
         let keep = (-bandwidth / rate).exp();
@@ -133,7 +133,8 @@ impl Colour {
     }
 }
 
-/// The least number in a range with which something holds that holds with all larger ones; none where there is none.
+/// The least number in a range for which a condition holds that also holds for all larger ones; `None` if
+/// there is none.
 fn least(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
     if holds(low) {
         return Some(low);

@@ -204,7 +204,7 @@ impl ModelFile {
     /// Reads `model.json` or `identified.json`.
     ///
     /// # Errors
-    /// As [`TorqueModel::read`].
+    /// Those of [`TorqueModel::read`].
     pub fn read(file: &Path) -> Result<ModelFile, FileError> {
         ModelFile::parse(&read_text(file)?, file)
     }
@@ -221,7 +221,7 @@ impl ModelFile {
     /// The model with its parameters and joints in the order of a body's.
     ///
     /// # Errors
-    /// As [`TorqueModel::checked`].
+    /// Those of [`TorqueModel::checked`].
     pub fn checked(self, body: &RigidArm) -> Result<TorqueModel, FileError> {
         self.model.in_set_of(body).checked(body.names(), body.dof(), &self.file)
     }

@@ -66,7 +66,7 @@ impl TorqueModel {
     /// joints. `body` is the arm with the model's changes.
     ///
     /// # Errors
-    /// As [`dyngen::Model::function`].
+    /// Those of [`dyngen::Model::function`].
     pub fn numeric_arm<const N: usize>(
         &self,
         body: &RigidArm,

@@ -14,7 +14,7 @@ pub const BAND: f64 = 20.0;
 /// Rows begin and end this long inside a stretch, s: what its filters do not know of the time beyond has died
 /// out by then.
 const ENDS: f64 = 0.16;
-/// A slower joint rests, rad/s or m/s: what is left there is how it sticks.
+/// A slower joint rests, rad/s or m/s: its residual there shows stiction.
 const REST: f64 = motion::REST_SPEED;
 /// Step of a joint's zero for its column, rad.
 const MOVED: f64 = 1e-3;

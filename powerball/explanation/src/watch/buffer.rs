@@ -56,7 +56,7 @@ impl Buffer {
     /// Drops what is older than is kept.
     pub(super) fn trim(&mut self) {
         let old = self.t.partition_point(|t| *t < self.latest() - KEPT);
-        // Not each time: what is left is moved.
+        // Not each time: the remaining samples are moved.
         if old as f64 * self.step > KEPT {
             self.t.drain(..old);
             self.q.iter_mut().chain(&mut self.torque).for_each(|x| drop(x.drain(..old)));

@@ -96,7 +96,7 @@ impl Stream<'_> {
         data.residual(&data.recordings.iter().map(torque).collect::<Vec<_>>())
     }
 
-    /// The earlier change that explains most by being over: it leaves the model as it was.
+    /// The earlier change whose end explains most: the model returns to its earlier state.
     fn over(&self, data: &Data<'_>, stretch: &Stretch<'_>, from: f64) -> Option<Found> {
         let square = |residual: &Signals| stretch.excess(residual, from, &[from]).1;
         let without = |k: usize| {

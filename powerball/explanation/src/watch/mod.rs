@@ -103,7 +103,7 @@ impl<'a> Watch<'a> {
         self.stream.as_mut().map(Stream::finish).unwrap_or_default()
     }
 
-    /// The joints of which it is known what the model leaves where it holds: the others are not watched.
+    /// The joints with a known residual of the unchanged model: the others are not watched.
     #[must_use]
     pub fn watched(&self) -> Vec<JointNumber> {
         let colours = self.stream.iter().flat_map(|stream| stream.colours.iter().enumerate());

@@ -44,7 +44,7 @@ const HEAVIEST: f64 = 200.0;
 /// A joint shows a change where that explains this much of its χ².
 const SHOWS: f64 = 15.0;
 
-/// The rows of a stretch of a log, and what is left of them.
+/// The rows of a stretch of a log, and their residual.
 pub(super) struct Stretch<'a> {
     pub(super) data: &'a Data<'a>,
     pub(super) residual: Signals,
@@ -169,7 +169,7 @@ impl<'a> Stretch<'a> {
         (excess.max(0.0), square)
     }
 
-    /// The residual without what a name says.
+    /// The residual without the torque of a name.
     pub(super) fn without(&self, named: &Named) -> Signals {
         let mut left = self.residual.clone();
         left.subtract(&named.columns, &named.coefficients);
@@ -215,9 +215,9 @@ impl<'a> Stretch<'a> {
         (c, explains)
     }
 
-    /// χ² that rows near `edges` have beyond [`ANYTHING`] each: when exactly a change sets in is known roughly, so any of
-    /// these rows may be anything. Without this an edge next to the true one, which leaves the true one's
-    /// rows to be explained, would seem to explain more.
+    /// χ² that rows near `edges` have beyond [`ANYTHING`] each: the start of a change is known only roughly,
+    /// so any of these rows may have any value. Without this an edge next to the true one, which leaves the
+    /// true one's rows to be explained, would seem to explain more.
     fn blurred(&self, edges: &[f64]) -> f64 {
         let near = |t: &f64| edges.iter().any(|edge| is_near(*edge, *t));
         let of = |(white, times): (&Vec<f64>, &Vec<f64>)| -> f64 {

@@ -44,7 +44,7 @@ pub(super) struct Stream<'a> {
     learns: Vec<bool>,
     pub(super) changes: Vec<Change>,
     pub(super) pending: Option<Pending>,
-    /// When it is asked again what an alarm means, s.
+    /// Time at which the cause of an alarm is searched again, s.
     pub(super) ask: f64,
     notes: Vec<String>,
 }

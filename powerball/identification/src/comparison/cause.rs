@@ -9,8 +9,8 @@ use dyngen::arm::{Parameter, ParameterKind};
 use dyngen::exact::rational::to_f64;
 use faer::Mat;
 
-/// A payload that leaves less than this share of the inertial difference unexplained is one, however small
-/// the errors.
+/// A payload is accepted if it leaves less than this share of the inertial difference unexplained, however
+/// small the errors are.
 const PAYLOAD_LEAVES: f64 = 0.05;
 
 /// The causes of the differences, the inertial ones first; empty if there are none.
@@ -60,7 +60,7 @@ struct Load {
     solver: Solver,
 }
 
-/// A link does as well as another one where it leaves at most this many times as much.
+/// A link explains the difference as well as another one if its residual is at most this many times as large.
 const AS_WELL: f64 = 1.1;
 /// The parameters of a body: of a link but for its rotor.
 fn of_a_body() -> impl Iterator<Item = ParameterKind> {

@@ -152,7 +152,7 @@ pub enum Cause {
     Payload {
         /// The link, from 1: the last where the difference is as well one of it.
         link: usize,
-        /// How much heavier `b` is, kg, and its standard error, where the logs tell it.
+        /// How much heavier `b` is, kg, and its standard error, if the logs determine it.
         mass: Option<[f64; 2]>,
         /// The size of the difference of first moments about the link's frame, kg·m: of the parts that the logs determine.
         first_moment: f64,

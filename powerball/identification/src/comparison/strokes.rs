@@ -97,7 +97,8 @@ fn stroke(q: &[f64], v: &[f64], torque: &[f64], side: f64) -> Option<Stroke> {
 /// joint does not go both ways often enough.
 pub(super) fn changes(a: &[Vec<Stroke>], b: &[Vec<Stroke>]) -> Vec<Option<Change>> {
     let pairs: Vec<Option<Vec<(Stroke, Stroke)>>> = a.iter().zip(b).map(|(a, b)| matched(a, b)).collect();
-    // A joint that rests in both says nothing; one on another path says that the others' torques are others.
+    // A joint that rests in both carries no information; one on another path shows that the torques of the
+    // others differ.
     match pairs.iter().all(Option::is_some) {
         true => pairs.iter().map(|pairs| Change::of(pairs.as_deref()?)).collect(),
         false => vec![None; a.len()],

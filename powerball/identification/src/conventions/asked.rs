@@ -106,7 +106,7 @@ impl<'a> Asked<'a> {
     }
 }
 
-// Logs made small: what a column is shows at a few samples a second, and in a few minutes.
+// Reduced logs: a few samples per second and a few minutes show the meaning of a column.
 
 /// Signals slower than this share of the rate are kept.
 const KEPT: f64 = 0.25;
@@ -268,7 +268,7 @@ impl Torques {
     }
 }
 
-// A factor by joint: what each torque column must be multiplied by to be of one body with the others.
+// A factor by joint: each torque column must be multiplied by it to fit one body with the others.
 //
 // The rigid arm is shared by all joints, so a factor on one of them shows. A common factor does not: the
 // median joint keeps its own. A joint that shares nothing with others keeps its own too.
@@ -284,7 +284,7 @@ pub(super) fn filed(numbers: impl Iterator<Item = Option<f64>>) -> Option<Vec<f6
     relative(numbers)
 }
 
-/// Over the median, where that leaves factors that are not one.
+/// The factors over their median, if some of them are then not one.
 fn relative(numbers: Vec<f64>) -> Option<Vec<f64>> {
     let middle = median(numbers.clone());
     let factors: Vec<f64> = numbers.iter().map(|x| x / middle).collect();

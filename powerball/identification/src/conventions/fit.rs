@@ -10,7 +10,7 @@ use faer::Mat;
 use powerball_logs::log::Log;
 use powerball_logs::regression::{Data, DataError, DataOptions, Recording, RigidArm};
 
-/// Joints count by what the fit leaves of them, not below this share of their torque.
+/// Joints are weighted by their residual of the fit, but at least by this share of their torque.
 const FLOOR: f64 = 0.03;
 /// Passes of that weighting.
 const PASSES: usize = 4;
@@ -48,7 +48,7 @@ pub(super) struct PartFit {
 /// The residuals of a reading.
 #[derive(Clone, Debug)]
 pub(super) struct Judged {
-    /// By part that is judged and joint: mean square of what is left over that of the torque; NaN for a joint
+    /// By part that is judged and joint: mean square of the residual over that of the torque; NaN for a joint
     /// that does not move.
     pub(super) left: [Vec<f64>; 2],
     /// Mean square of the torque by joint, both parts together.
@@ -247,7 +247,7 @@ impl<'a> Rows<'a> {
     /// half part 1.
     ///
     /// # Errors
-    /// As [`Data::new`].
+    /// Those of [`Data::new`].
     pub(super) fn new(
         body: &'a RigidArm,
         logs: &[Log],
@@ -326,7 +326,7 @@ fn between(x: &[f64], at: f64) -> f64 {
     -before * (s - 2.0) * a + after * (s - 1.0) * b - after * s * c + before * (s + 1.0) * d
 }
 
-/// The columns of the same parameters without what gravity does.
+/// The columns of the same parameters without gravity.
 fn without_gravity<'a>(data: &Data<'a>) -> Data<'a> {
     data.of_other_columns(data.body.names().len(), |r| {
         let still = vec![0.0; r.q.len()];

@@ -2,15 +2,15 @@
 //! reported; nothing is modified.
 //!
 //! Every answer is judged against its alternatives: by the held-out error of one rigid arm with textbook
-//! friction, fitted to one part of the logs and judged by the other, both ways round; and by what cannot be
-//! negative, the energy of motion and the power that friction takes. An alternative is reported as different
-//! from what is declared only if it halves the squared errors both ways round, or has a physical sign that is
-//! certain in both parts.
+//! friction, fitted to one part of the logs and judged by the other, both ways round; and by quantities that
+//! cannot be negative, the energy of motion and the power that friction takes. An alternative is reported as
+//! different from what is declared only if it halves the squared errors both ways round, or has a physical
+//! sign that is certain in both parts.
 //!
 //! | | |
 //! |---|---|
-//! | `result`, `answers` | the result with the column map that would set it right; its words |
-//! | `asked`, `fit` | logs made small, and a way to read their columns; its rows, and what it leaves |
+//! | `result`, `answers` | the result with the correcting column map; its words |
+//! | `asked`, `fit` | logs made small, and a way to read their columns; its rows, and its residual |
 //! | `physics`, `properties` | energies; unit, sign, side, kind, gravity and delay of the torques |
 //! | `arm_file` | one change of the reading; whether the arm file is this arm's |
 //! | `search` | the best reading |

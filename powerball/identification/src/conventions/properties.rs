@@ -169,7 +169,8 @@ const SURE: f64 = 5.0;
 const AGAINST: f64 = 3.0;
 
 /// The joints that friction drives where it brakes the others: their torque or their position has the other
-/// sign. Each joint is asked by itself, with inertial parameters of its own, so that the others do not matter.
+/// sign. Each joint is tested by itself, with inertial parameters of its own, so that the others do not
+/// matter.
 pub(super) fn driven_by_friction(rows: &Rows<'_>, read: &Torques, energies: &[Energies; 2]) -> Vec<usize> {
     let moving: Vec<usize> = (0..rows.dof()).filter(|j| rows.moves(*j)).collect();
     let sign_of = |joint: usize| {

@@ -9,8 +9,8 @@ use super::result::GravityIs;
 use dyngen::exact::rational::to_f64;
 use powerball_logs::regression::DataError;
 
-/// Held-out squared errors are compared after adding this share of the torque's: below 2 % nothing is asked
-/// for.
+/// Held-out squared errors are compared after adding this share of the torque's: below 2 % no change is
+/// searched.
 const FLOOR: f64 = 4e-4;
 /// A change is clear where it lowers squared errors to this share, both ways round.
 const CLEAR: f64 = 0.5;

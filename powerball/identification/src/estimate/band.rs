@@ -43,18 +43,20 @@ pub fn solve_in_band(reduced: &Bands, law: FrictionKind) -> InBand {
     }
 }
 
-/// A joint of whose torque a fit of the widest band leaves more than this share may have a narrower one.
+/// A joint may have a narrower band if the residual of a fit of the widest band is more than this share of
+/// its torque.
 const MUCH: f64 = 0.1;
 
-/// Which of [`BANDS`] each joint has: `left` is the share of its torque that a fit of the widest leaves.
+/// Which of [`BANDS`] each joint has: `left` is the residual of a fit of the widest band as a share of its
+/// torque.
 fn joint_bands(left: &[f64], spectrum: &[Powers]) -> Vec<usize> {
     // Number of octaves below the widest band in which the model is smaller than its residual.
     let quiet = |octaves: &Powers| octaves.iter().take_while(|[model, left]| model < left).count();
     left.iter().zip(spectrum).map(|(left, octaves)| if *left > MUCH { quiet(octaves) } else { 0 }).collect()
 }
 
-/// Which of [`BANDS`] each joint has where single samples are at hand: as [`solve_in_band`] has it. `left` is the share of
-/// each joint's torque that a fit of the widest band leaves.
+/// Which of [`BANDS`] each joint has if single samples are available, as in [`solve_in_band`]. `left` is the
+/// residual of a fit of the widest band as a share of each joint's torque.
 #[must_use]
 pub fn bands_of_logs(body: &RigidArm, logs: &[Log], options: &DataOptions, left: &[f64]) -> Vec<usize> {
     if left.iter().all(|left| *left <= MUCH) {

@@ -75,7 +75,7 @@ struct Link {
 /// row a value.
 ///
 /// # Errors
-/// As [`Model::set`].
+/// Those of [`Model::set`].
 pub fn nearest(model: &Model, kind: SetKind, values: &[f64], metric: &Mat<f64>) -> Result<Consistent, Error> {
     let arm = model.arm();
     let set = model.set(kind)?;
@@ -321,7 +321,7 @@ pub struct ConsistentReport {
 /// dissipative, as in the fit.
 ///
 /// # Errors
-/// As [`nearest`].
+/// Those of [`nearest`].
 pub fn consistent_fit(body: &RigidArm, solution: &Solution) -> Result<ConsistentFit, Error> {
     let layout = solution.layout;
     let (p, size) = (layout.inertial, layout.size());
@@ -393,7 +393,7 @@ impl TorqueMetric {
     /// For a set of an arm; the states are the same at every call.
     ///
     /// # Errors
-    /// As [`Evaluator::new`].
+    /// Those of [`Evaluator::new`].
     pub fn new(model: &Model, kind: SetKind) -> Result<TorqueMetric, Error> {
         let evaluator = Evaluator::new(model, Function::Regressor, kind)?;
         let arm = model.arm();

@@ -407,7 +407,7 @@ pub struct JointVerdict {
     pub within: Option<bool>,
 }
 
-/// Judges what a model leaves on data: an error up to `tolerance` times the rms torque of a joint passes.
+/// Judges the residual of a model on data: an error up to `tolerance` times the rms torque of a joint passes.
 #[must_use]
 pub fn verdicts(data: &Data<'_>, residual: &[Vec<f64>], tolerance: f64) -> Vec<JointVerdict> {
     let errors = residual_stats(data, residual);

@@ -24,8 +24,8 @@ pub struct Together {
     pub each: Vec<Bands>,
 }
 
-/// Left by the fit to all mountings, over what a fit to one alone leaves of its logs, from which on they
-/// contradict each other.
+/// Ratio of the residual of the fit to all mountings and that of a fit to one alone, from which on the
+/// mountings contradict each other.
 const CONTRADICTS: f64 = 2.0;
 
 impl Together {
@@ -62,9 +62,9 @@ impl Together {
         self.each.iter().map(of).collect()
     }
 
-    /// The joints, from 1, on which one parameter vector leaves far more of the logs of a mounting than a
-    /// vector of their own does, by mounting: its mounting or another one's is stated wrongly, or the arm was
-    /// not the same.
+    /// The joints, from 1, on which one parameter vector has a far larger residual on the logs of a mounting
+    /// than a separate vector, by mounting: its mounting or another one is stated wrongly, or the arm was not
+    /// the same.
     #[must_use]
     pub fn contradictions(
         &self,

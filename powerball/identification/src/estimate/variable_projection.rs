@@ -233,9 +233,9 @@ pub(super) fn first((low, high): (f64, f64)) -> [f64; 2] {
     [high / 10.0, low * 20.0]
 }
 
-/// The pair of steepnesses that leaves the least on one joint, all else refitted, levels ≥ 0. Where `present`
-/// holds the joint's steepnesses, they are among those tried, with their tangents: a bend in addition to a
-/// step that is known is then not outdone by a second step that corrects the first.
+/// The pair of steepnesses with the smallest residual on one joint, all else refitted, levels ≥ 0. Where
+/// `present` holds the joint's steepnesses, they are among those tried, with their tangents: a bend in
+/// addition to a step that is known is then not outdone by a second step that corrects the first.
 #[must_use]
 pub(super) fn search<R: SeparableRows>(
     rows: &R,

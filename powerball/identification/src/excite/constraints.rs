@@ -238,7 +238,7 @@ pub const CLEARANCE: f64 = 0.02;
 /// An arm does not stand on a floor at its base that blocks more than this share of its poses.
 const HANGS: f64 = 0.95;
 
-/// A floor's height above the base frame's origin, m; or that there is none.
+/// A floor's height above the base frame's origin, m; `None` without a floor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FloorAt(pub Option<f64>);
 

@@ -90,7 +90,7 @@ impl Masses {
     /// and acceleration.
     ///
     /// # Errors
-    /// As [`Load::new`].
+    /// Those of [`Load::new`].
     pub fn guess(model: &Model, shape: &Shape, limits: &[JointLimits]) -> Result<Masses, Error> {
         let arm = model.arm();
         let mut masses = Masses {
@@ -171,7 +171,7 @@ impl Load {
     /// The torques of a model (its gravity is the mounting's); `limits` already leave their margin.
     ///
     /// # Errors
-    /// As [`Evaluator::new`].
+    /// Those of [`Evaluator::new`].
     pub fn new(model: &Model, masses: &Masses, limits: &[JointLimits]) -> Result<Load, Error> {
         let set = model.set(SetKind::Minimal)?;
         Ok(Load {

@@ -124,7 +124,7 @@ impl<J> Judged<J> {
 /// Finds a path for a parameter set of an arm within the limits of its file, and no other constraint.
 ///
 /// # Errors
-/// As [`optimise_all`].
+/// Those of [`optimise_all`].
 pub fn optimise(model: &Model, kind: SetKind, settings: &Settings) -> Result<Excitation, Error> {
     check(settings)?;
     let constraints = Constraints::of(Limits::of(model.arm(), settings.margin)?);
@@ -187,7 +187,7 @@ pub fn optimise_all(tasks: &[Task<'_>], kind: SetKind, settings: &Settings) -> R
 /// for that path, and of the middle one of the random starts.
 ///
 /// # Errors
-/// As [`search_all`].
+/// Those of [`search_all`].
 pub fn search<J: Clone>(
     settings: &Settings,
     limits: &Limits,

@@ -18,7 +18,7 @@ use std::fmt;
 /// Two parts count as joined within this many radii of the joints between them: their capsules overlap there
 /// whatever the arm does.
 const JOINED: f64 = 6.0;
-/// Poses that tell what always touches and what never moves.
+/// Number of poses that show which links always touch and which never move.
 const POSES: usize = 256;
 
 /// The nearest pair in a pose.
@@ -357,7 +357,7 @@ acceleration = 3
                 }
                 let with_floor = shape.nearest(&q, Some(&floor)).map_or(f64::INFINITY, |near| near.distance);
                 let to_floor = lowest + 0.3 - radius;
-                // What stands still is not asked about.
+                // Links that stand still are not checked.
                 assert!(with_floor <= links + 1e-12);
                 if floor.moving.iter().skip(1).all(|m| *m) && lowest < 0.0 {
                     approx::assert_abs_diff_eq!(with_floor, links.min(to_floor), epsilon = 1e-9);

@@ -25,7 +25,7 @@ pub(super) struct FittedLaw {
     pub effects: Vec<Candidate>,
     /// 1, or −1 where the motor counts against the link.
     sign: f64,
-    /// Sum of squares that it leaves, less what noise of the link adds.
+    /// Sum of squares of its residual, less the part that noise of the link adds.
     cost: f64,
 }
 
@@ -81,7 +81,7 @@ impl FittedLaw {
         self.at_link(self.columns.len() - self.effects.len() + which)
     }
 
-    /// Sum of squares that it leaves of some rows.
+    /// Sum of squares of its residual on some rows.
     pub(super) fn left(&self, products: &Products) -> f64 {
         products.normal(&self.columns, self.sign).left(&self.theta)
     }

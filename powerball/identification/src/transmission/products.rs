@@ -13,7 +13,7 @@ use powerball_logs::regression::{Recording, top_velocity};
 use powerball_logs::signal::resample::{linear, median_step};
 use powerball_logs::signal::{Band, difference, motion};
 
-/// Length of a block, s: one to three correlation times of what is left.
+/// Length of a block, s: one to three correlation times of the residual.
 const BLOCK: f64 = 0.5;
 /// Least number of blocks of motion for a result.
 const FEWEST_BLOCKS: usize = 12;
@@ -413,7 +413,7 @@ impl Motor {
 }
 
 impl Piece {
-    /// A joint's motor torque; nothing where there is none.
+    /// A joint's motor torque; empty if there is none.
     pub(super) fn motor(&self, joint: usize) -> &[f64] {
         self.motors.get(joint).map_or(&[], |motor| &motor.torque)
     }

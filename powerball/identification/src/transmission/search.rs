@@ -22,8 +22,7 @@ const SAME_RATIO: f64 = 0.2;
 const LEVEL: f64 = 1e-4;
 /// Effects on one joint at most.
 const MOST: usize = 3;
-/// Another effect that leaves no more than this many times what the chosen one leaves could be there in its
-/// place.
+/// Another effect whose residual is at most this many times that of the chosen one could be there instead.
 const AS_GOOD: f64 = 1.1;
 /// If more of a motor's torque stays, it does not belong to this joint: less than half of its square is
 /// explained.

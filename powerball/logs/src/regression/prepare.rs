@@ -102,7 +102,7 @@ impl<'a> Data<'a> {
     /// Prepares logs whose signals are corrected on the even grid before they pass the band.
     ///
     /// # Errors
-    /// As [`Data::new`].
+    /// Those of [`Data::new`].
     pub fn corrected(
         body: &'a RigidArm,
         logs: &[Log],

@@ -62,7 +62,8 @@ impl RigidArm {
     /// Derives and proves the minimal-set functions of an arm.
     ///
     /// # Errors
-    /// As [`Model::derive`] and [`Evaluator::new`]; [`Error::Mimics`] where a joint follows another one.
+    /// Those of [`Model::derive`] and [`Evaluator::new`]; [`Error::Mimics`] where a joint follows another
+    /// one.
     pub fn new(arm: &Arm) -> Result<RigidArm, Error> {
         RigidArm::mounted(arm, arm)
     }
@@ -70,7 +71,7 @@ impl RigidArm {
     /// Like [`RigidArm::new`], for an arm under another gravity than that of its file.
     ///
     /// # Errors
-    /// As [`RigidArm::new`].
+    /// Those of [`RigidArm::new`].
     pub fn mounted(arm: &Arm, filed: &Arm) -> Result<RigidArm, Error> {
         arm.without_mimics().map_err(Error::Mimics)?;
         let model = Model::derive(arm.clone())?;
@@ -194,7 +195,7 @@ impl RigidArm {
     /// Whether a real arm can have these values of the minimal set.
     ///
     /// # Errors
-    /// As [`Model::function`].
+    /// Those of [`Model::function`].
     pub fn possibility(&self, values: &[f64]) -> Result<Possibility, Error> {
         dyngen::consistency::check(&self.model, SetKind::Minimal, values)
     }

@@ -33,7 +33,7 @@ pub struct Butterworth {
     pub sections: Vec<Biquad>,
     /// Samples of padding at each end for zero-phase use: the filter has rung out after them.
     padding: usize,
-    /// Samples after which nothing is left of a state in double precision.
+    /// Number of samples after which a state has decayed in double precision.
     memory: usize,
 }
 

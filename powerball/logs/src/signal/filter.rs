@@ -6,9 +6,9 @@ use super::Butterworth;
 use super::butterworth::Biquad;
 use crate::batch::{self, Work};
 
-/// The bands of an analysis, Hz, widest first, an octave apart: each is made of the one before. Above the widest,
-/// accelerations are noise of positions differentiated twice, and arms are hardly rigid; a motion and what
-/// friction does at its reversals are slower than the narrowest.
+/// The bands of an analysis, Hz, widest first, an octave apart: each is made of the one before. Above the
+/// widest, accelerations are noise of positions differentiated twice, and arms are hardly rigid; a motion and
+/// the friction at its reversals are slower than the narrowest.
 pub const BANDS: [f64; 3] = [7.0, 3.5, 1.75];
 /// Time that is left out at each end of a stretch, s.
 const ENDS: f64 = 0.3;

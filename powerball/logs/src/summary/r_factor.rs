@@ -96,7 +96,7 @@ impl RFactor {
         }
     }
 
-    /// Takes a block of `count` rows in, column by column; what is left in it is of no use.
+    /// Adds a block of `count` rows, column by column; the block is overwritten.
     pub fn push_block(&mut self, block: &mut [f64], count: usize) {
         self.rows += count as u64;
         self.reflect(block, count);

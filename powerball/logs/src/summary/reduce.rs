@@ -87,7 +87,7 @@ impl Summary {
     /// Takes a log in whose signals are corrected on the even grid, part by part.
     ///
     /// # Errors
-    /// As [`Summary::push`].
+    /// Those of [`Summary::push`].
     pub fn push_corrected(
         &mut self,
         body: &RigidArm,
@@ -168,8 +168,8 @@ pub(super) fn push_in_bands(
     }
 }
 
-/// A log in parts that share what a band leaves out at their ends: each piece of it in equal ones of about
-/// two minutes.
+/// A log in overlapping parts: they share the time that a band leaves out at their ends. Each piece of the
+/// log gives equal parts of about two minutes.
 #[must_use]
 pub fn parts(log: &Log) -> Vec<Log> {
     let whole = |log: &Log| log.t.last().unwrap_or(&0.0) - log.t.first().unwrap_or(&0.0);
@@ -407,7 +407,7 @@ impl Bands {
     /// Takes in what other logs of the same arm gave.
     ///
     /// # Errors
-    /// As [`Summary::merge`].
+    /// Those of [`Summary::merge`].
     pub fn merge(&mut self, other: &Bands) -> Result<(), SummaryError> {
         self.bands.iter_mut().zip(&other.bands).try_for_each(|(summary, other)| summary.merge(other))
     }

@@ -104,7 +104,7 @@ pub(super) fn read_from(source: &mut impl Source, topics: &mut Topics) -> io::Re
     Ok(records.done(torn))
 }
 
-/// The summary at the end of a file; none where there is none.
+/// The summary at the end of a file; `None` if there is none.
 fn summary(source: &mut impl Source) -> McapResult<Option<Summary>> {
     let length = source.length()?;
     let mut reader = SummaryReader::new_with_options(SummaryReaderOptions::default().with_file_size(length));
@@ -167,7 +167,7 @@ impl<'t> Records<'t> {
         }
     }
 
-    /// Reads by the index, where there is one; false where it does not tell of all messages.
+    /// Reads by the index, if there is one; false if it does not list all messages.
     fn by_index(&mut self, file: &mut impl Source, summary: &Summary) -> io::Result<Option<bool>> {
         let Some(stats) = &summary.stats else { return Ok(None) };
         if summary.chunk_indexes.len() != stats.chunk_count as usize {

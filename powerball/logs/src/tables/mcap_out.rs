@@ -64,7 +64,7 @@ impl<W: Write> McapWriter<W> {
     /// A topic of joint states.
     ///
     /// # Errors
-    /// As [`McapWriter::new`].
+    /// Those of [`McapWriter::new`].
     pub fn joint_states(&mut self, topic: &str) -> io::Result<Channel> {
         self.channel(topic, "sensor_msgs/msg/JointState", "ros2msg", JOINT_STATE, "cdr")
     }
@@ -72,7 +72,7 @@ impl<W: Write> McapWriter<W> {
     /// A topic of JSON objects whose members are numbers.
     ///
     /// # Errors
-    /// As [`McapWriter::new`].
+    /// Those of [`McapWriter::new`].
     pub fn numbers(&mut self, topic: &str, kind: &str, members: &[&str]) -> io::Result<Channel> {
         let number = |name: &&str| (name.to_string(), serde_json::json!({ "type": "number" }));
         let properties: Map<String, Value> = members.iter().map(number).collect();
@@ -96,7 +96,7 @@ impl<W: Write> McapWriter<W> {
     /// A message of joint states at a time, s.
     ///
     /// # Errors
-    /// As [`McapWriter::new`].
+    /// Those of [`McapWriter::new`].
     pub fn state(
         &mut self,
         channel: Channel,
@@ -113,7 +113,7 @@ impl<W: Write> McapWriter<W> {
     /// A message of numbers at a time, s.
     ///
     /// # Errors
-    /// As [`McapWriter::new`].
+    /// Those of [`McapWriter::new`].
     pub fn object<'n>(
         &mut self,
         channel: Channel,
@@ -136,7 +136,7 @@ impl<W: Write> McapWriter<W> {
     /// Ends the file: its last chunk, its index and its statistics.
     ///
     /// # Errors
-    /// As [`McapWriter::new`].
+    /// Those of [`McapWriter::new`].
     pub fn finish(mut self) -> io::Result<W> {
         self.inner.finish().map_err(failed)?;
         let mut out = self.inner.into_inner().into_inner();

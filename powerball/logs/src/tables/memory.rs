@@ -79,7 +79,7 @@ impl Memory {
     /// Whether that number of rows of that many numbers fits.
     ///
     /// # Errors
-    /// As [`Memory::holds`].
+    /// Those of [`Memory::holds`].
     pub(crate) fn holds_rows(&self, rows: usize, numbers: usize) -> Result<(), String> {
         self.holds((rows as u64).saturating_mul(numbers as u64).saturating_mul(NUMBER))
     }
@@ -92,7 +92,7 @@ impl Memory {
     /// Takes a number of bytes of it; where they are not there, the log is refused.
     ///
     /// # Errors
-    /// As [`Memory::holds`].
+    /// Those of [`Memory::holds`].
     pub(crate) fn claim(&mut self, bytes: u64) -> Result<(), String> {
         let held = self.holds(bytes);
         match &held {
@@ -105,7 +105,7 @@ impl Memory {
     /// Takes the bytes of a number of values.
     ///
     /// # Errors
-    /// As [`Memory::holds`].
+    /// Those of [`Memory::holds`].
     pub(crate) fn claim_numbers(&mut self, count: usize) -> Result<(), String> {
         self.claim((count as u64).saturating_mul(NUMBER))
     }

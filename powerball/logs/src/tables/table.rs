@@ -51,7 +51,7 @@ pub struct Table {
 pub struct Column {
     /// The column's name: `q1`, `position.shoulder_pan_joint`.
     pub name: String,
-    /// One value a sample, not a number where there is none.
+    /// One value per sample; NaN if there is none.
     pub values: Vec<f64>,
 }
 

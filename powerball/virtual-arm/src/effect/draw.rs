@@ -27,7 +27,7 @@ pub struct Places {
     pub flange: f64,
 }
 
-/// `None` where there is none.
+/// One of the items; `None` if there are none.
 fn one_of<T: Clone>(from: &[T], rng: &mut impl Rng) -> Option<T> {
     if from.is_empty() { None } else { from.get(rng.random_range(0..from.len())).cloned() }
 }

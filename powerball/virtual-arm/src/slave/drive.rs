@@ -38,7 +38,7 @@ pub(super) struct Inputs {
     pub(super) window: f64,
     /// Torque limit, N·m.
     pub(super) torque_limit: f64,
-    /// The brake is asked to close by 0x60FE.
+    /// The brake is commanded to close by 0x60FE.
     pub(super) brake: bool,
 }
 
@@ -74,7 +74,7 @@ pub(super) struct Drive {
     acknowledged: bool,
     limited: bool,
     halted: bool,
-    /// Since the brake was asked to be other than it is, s.
+    /// Time since the brake was commanded to another state than its own, s.
     brake_wait: f64,
     brake_closed: bool,
     /// The brake bites and does not let go.

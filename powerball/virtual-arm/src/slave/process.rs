@@ -121,7 +121,7 @@ impl Pdo {
         Frame::from_raw(self.id, &bytes[..len])
     }
 
-    /// Whether it goes out with this SYNC, the `count`-th since the drive went operational.
+    /// Whether it is sent with this SYNC, the `count`-th since the drive went operational.
     pub(super) fn due(&self, count: u64) -> bool {
         (1..=240).contains(&self.kind) && count.is_multiple_of(u64::from(self.kind))
     }

@@ -27,7 +27,7 @@ const ROOM: usize = 1024;
 const ANSWER: Micros = 500_000;
 /// Time from one question for the status flags to the next, µs.
 const ASKING: Micros = 250_000;
-/// An adapter that leaves a question without an answer for this long is gone, µs.
+/// Time without an answer after which an adapter counts as removed, µs.
 const SILENCE: Micros = 1_000_000;
 /// Windows takes 0 for "for ever".
 const WRITE_TIMEOUT: Duration = if cfg!(windows) { Duration::from_millis(1) } else { Duration::ZERO };
@@ -49,7 +49,7 @@ pub struct Slcan {
     before: Flags,
     /// When to ask for the flags again; `None` where the adapter has none.
     ask_at: Option<Micros>,
-    /// When the question was asked that has no answer yet.
+    /// Time of the last question without an answer.
     asked: Option<Micros>,
     /// The adapter may refuse the half frame that a flush left.
     forgiven: bool,

@@ -42,7 +42,8 @@ impl Events {
         output::Verbosity { verbose: self.verbose, quiet: self.quiet }
     }
 
-    /// Begins to listen; what is returned writes what is left when it is dropped, and must live until the program ends.
+    /// Begins to listen. The returned guards write the remaining lines when they are dropped, and must live
+    /// until the program ends.
     pub(super) fn listen(&self) -> Result<Vec<WorkerGuard>, Failure> {
         let level = match (self.quiet, self.verbose) {
             (true, _) => "error",

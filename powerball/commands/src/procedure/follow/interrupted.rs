@@ -11,7 +11,8 @@ use powerball_bus::transport::{ArmError, BusError, Event, Interrupt, Memory};
 use powerball_identification::NumericArm;
 use powerball_virtual_arm::VirtualArm;
 
-/// A bus whose user is asked to end after a number of its steps, and what he sent from then on.
+/// A bus whose user is asked to end after a number of its steps, and the frames that the user sent from then
+/// on.
 #[derive(Debug)]
 struct Asking {
     bus: Memory<VirtualArm>,

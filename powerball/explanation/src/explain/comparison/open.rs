@@ -13,7 +13,7 @@ use powerball_controller::JointNumber;
 use powerball_identification::estimate::{Design, Fit, Folds, friction_columns};
 use powerball_logs::regression::{Column, Data, Signals};
 
-/// Names for the same residual that the logs do not tell apart, the preferred one first.
+/// Names for the same residual that the logs cannot distinguish, the preferred one first.
 #[derive(Debug)]
 pub struct Open {
     /// At least two hypotheses.

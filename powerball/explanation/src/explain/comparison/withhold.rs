@@ -112,7 +112,7 @@ fn find_harmful(study: &Study<'_>, model: &Model) -> Option<usize> {
     })
 }
 
-/// Whether a step's name is not distinguished from others and leaves much.
+/// Whether a step's name is not distinguished from others and a large residual remains.
 fn is_weak(study: &Study<'_>, model: &Model, step: &Step) -> bool {
     step.comparison.distinct_margin < study.rule().least_margin
         && model.accepted.iter().any(|a| a.step() == Some(step.number))
@@ -143,8 +143,8 @@ pub(crate) fn leftover(before: &[f64], after: &[f64], floor: &[f64], joints: &[J
     if old > 0.0 { (excess(after) / old).min(1.0) } else { 0.0 }
 }
 
-// Whether an effect is there at every pace. A name that is not the truth is fitted where most of the truth
-// is, in slow motion say; in faster motion what the same law says is then not there. (Tests of constant
+// Whether an effect is there at every speed of motion. A wrong name is fitted where most of the true effect
+// is, in slow motion say; in faster motion the torque of its law is then not there. (Tests of constant
 // parameters, after Chow 1960; here over octaves of time in the place of periods.)
 
 /// By octave, fast to slow: how much larger or smaller the effect is there than over all, as a share, and the

@@ -1,4 +1,4 @@
-//! Log by log: is it like the others, and what is different in it?
+//! The comparison of each log with the others, and its differences.
 //!
 //! All logs are fitted together here, so that they are judged alike: otherwise a log with a path of its own
 //! would differ only because the model does not know that path.

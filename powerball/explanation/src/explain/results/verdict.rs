@@ -18,14 +18,14 @@ pub struct Verdict {
     pub joint: JointNumber,
     /// How well.
     pub state: State,
-    /// rms of what is left over rms of the measured torque; not a number where the joint does not move.
+    /// rms of the residual over rms of the measured torque; NaN if the joint does not move.
     pub left: f64,
     /// The dependencies of the remaining error, its likely causes, and what to record or check; empty if
     /// little remains.
     pub advice: String,
 }
 
-/// How well a torque is predicted by the model with what was named. The first of these that is so holds.
+/// How well the model with the named effects predicts a torque. The first state that applies is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum State {
     /// The remaining error is hardly more than measurement noise
@@ -274,7 +274,7 @@ impl Evidence {
         Evidence { margin: effect.margin, alike, leftover: effect.leftover }
     }
 
-    /// 1, whether another name fits as well, the logarithm of the margin, and what is left over.
+    /// 1, whether another name fits as well, the logarithm of the margin, and the remaining share.
     #[must_use]
     pub fn features(&self) -> [f64; FEATURES] {
         let margin = within(self.margin, [1.0, LARGEST_MARGIN]).ln();

@@ -84,7 +84,7 @@ impl CrossValidation {
     }
 }
 
-/// The Wald test over blocks as long as what the trial leaves remembers.
+/// The Wald test over blocks as long as the memory of the trial's residual.
 fn by_blocks(screen: &Screen<'_>, trial: &Trial, candidate: &Candidate) -> f64 {
     let data = screen.context.data;
     let rule = screen.context.rule;

@@ -111,10 +111,10 @@ impl Needed {
     }
 }
 
-/// Takes out of the model what was in it from the start and is not needed, what the logs demand least first, each
-/// judged with everything else in the model. Needed is what the fitted logs demand. Where a model fits badly
-/// its residual is slow and demands little by itself; what goes out must then not raise the errors of logs
-/// that took no part in the fit, both ways round and all that went out together.
+/// Removes effects that were in the model from the start and are not needed, the least needed first, each
+/// judged with everything else in the model. An effect is needed if the fitted logs demand it. If a model
+/// fits badly, its residual is slow and demands little by itself; the removed effects together must then not
+/// raise the errors of logs that were not fitted, both ways round.
 pub(crate) fn keep_needed(study: &Study<'_>, model: &mut Model) {
     let rule = study.rule();
     let mut risen = [0.0; 2];

@@ -192,9 +192,9 @@ fn by_chance(screen: &Screen<'_>, trial: &Trial, after: &[Vec<f64>], seconds: f6
 const EVENT_PARTS: usize = 5;
 
 /// Held-out gains of a short event: it happens once, so that each part of its rows is predicted from the
-/// others. Rows are dealt to the parts in turn: a part in one piece would ask whether the noise of a fifth of
-/// the event is smaller than the event, while an event is distinguished from slow noise by what its log holds
-/// elsewhere ([`by_chance`]).
+/// others. Rows are dealt to the parts in turn: a part in one piece would test whether the noise of a fifth
+/// of the event is smaller than the event, while an event is distinguished from slow noise by what its log
+/// holds elsewhere ([`by_chance`]).
 fn event_gains(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]) -> Vec<f64> {
     let fit = screen.context.fit;
     let k = trial.columns.len();

@@ -27,7 +27,7 @@ pub(crate) struct Member {
     /// Filled in once tested.
     pub(crate) evidence: Option<Evidence>,
     pub(crate) refusal: Option<String>,
-    /// Whether the validation set can tell it from any other misfit.
+    /// Whether the validation set can distinguish it from any other error.
     pub(crate) judged: bool,
 }
 
@@ -236,7 +236,7 @@ fn untested_refusal(
     only_corrects(model, screen, member).map(|name| (format!("only corrects the law of {name}"), true))
 }
 
-/// The accepted effect that would be a part of a law without a name, where it leaves too little to be a false
+/// The accepted effect that would be a part of a law without a name, if its residual is too small for a false
 /// name.
 fn would_absorb(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<&'static str> {
     let Member { candidate, trial, .. } = member;

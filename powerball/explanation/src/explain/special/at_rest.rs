@@ -70,8 +70,9 @@ const ROUNDS: usize = 2;
 
 /// The pushes in all logs, those that were fitted first.
 ///
-/// `arm` is the arm with the changes of `model`, and the last link holds the model's payload during the windows `held`
-/// of the fitted logs and of the validation set. `errors` are what the model leaves of the latter, rms by joint.
+/// `arm` is the arm with the changes of `model`, and the last link holds the model's payload during the
+/// windows `held` of the fitted logs and of the validation set. `errors` are the residuals of the model on
+/// the latter, rms by joint.
 pub(crate) fn pushes_at_rest(
     study: &Study<'_>,
     (model, arm): (&TorqueModel, &RigidArm),
@@ -103,8 +104,8 @@ pub(crate) fn pushes_at_rest(
     in_fitted.into_iter().chain(in_judged).collect()
 }
 
-/// When something pushes, by log and rest, with what may be left there. The rests of `fitted` tell that of other logs; where
-/// there are none, the other logs of the rests themselves.
+/// The times of pushes, by log and rest, with the usual residual there. The rests of `fitted` give the usual
+/// residual of other logs; if there are none, the other logs of the rests themselves.
 fn pushed(
     rests: &[Rest<'_>],
     fitted: Option<&[Rest<'_>]>,
@@ -310,8 +311,8 @@ impl Rest<'_> {
     }
 }
 
-/// The force that explains most of what is left at one sample, N, and the share of it; each joint counts as surely as
-/// its limit lets it.
+/// The force that explains most of the residual at one sample, N, and its share; each joint is weighted by
+/// its limit.
 fn force(limits: &Limits, left: &[f64], lever: &[Vec<f64>; 3]) -> Option<([f64; 3], f64)> {
     let weight = |j: usize| 1.0 / (limits.limit[j].powi(2) + limits.noise[j].powi(2));
     let sum = |x: &[f64], y: &[f64]| (0..left.len()).map(|j| weight(j) * x[j] * y[j]).sum::<f64>();

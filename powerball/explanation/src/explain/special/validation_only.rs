@@ -65,13 +65,13 @@ struct Seen {
     margin: f64,
 }
 
-/// Looks for what is in logs of the validation set only (see
+/// Searches for effects in logs of the validation set only (see
 /// [`Effect::may_be_in_validation_only`](crate::effects::Effect::may_be_in_validation_only)), and for a
 /// body that all fitted logs have and no other one.
 ///
-/// It can be learnt nowhere else than where all logs are together: its few numbers are fitted to all of them, and the
-/// result says in which log it was seen. Returned are the rows without its torque and the base model of these:
-/// everything else is judged on them.
+/// Such an effect can be learnt only from all logs together: its few numbers are fitted to all of them, and
+/// the result says in which log it was seen. Returned are the rows without its torque and the base model of
+/// these: everything else is judged on them.
 ///
 /// # Errors
 /// [`DataError`] as for any data.
@@ -181,8 +181,8 @@ fn taken_out_of_fitted<'a>(
     Some((effect, without, fitted))
 }
 
-/// Takes what was seen of an effect out of the validation set, where it is what makes its logs odd. Returned with it is
-/// that set without it.
+/// Removes an effect that was seen from the validation set, if it causes the difference of its logs. Also
+/// returns that set without it.
 fn taken_out<'a>(
     rule: &Rule,
     pooled: &Pooled<'_>,
@@ -360,9 +360,9 @@ fn oddness(base: &Fit, other: &Data<'_>, residual: &[Vec<f64>], log: usize) -> f
     ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
 }
 
-/// Whether what was seen is what makes its logs odd: without its torque little of their excess over the fitted logs is
-/// left, and no joint's error is larger. A base model that is wrong on a new path makes them odd as
-/// well, and what fits best there only resembles that error.
+/// Whether the effect causes the difference of its logs: without its torque little of their excess over the
+/// fitted logs remains, and no joint's error is larger. A base model that is wrong on a new path also makes
+/// them different, and the best fit there only resembles that error.
 fn makes_it_odd(
     rule: &Rule,
     base: &Fit,

@@ -68,7 +68,7 @@ fn explained(arm: (Arm, Plant), effect: Effect, listed: &[usize]) -> Explained {
     explained_of(arm, &[(effect, listed)])
 }
 
-/// As [`explained`], with several effects, each in logs of its own.
+/// Like [`explained`], with several effects, each in logs of its own.
 fn explained_of((arm, usual): (Arm, Plant), effects: &[(Effect, &[usize])]) -> Explained {
     explained_logs(&arm, recorded(&arm, &usual, effects))
 }

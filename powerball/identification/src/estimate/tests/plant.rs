@@ -30,7 +30,7 @@ pub(super) fn record(sensors: &Sensors, logs: usize, periods: usize, seed: u64) 
     record_mounted(filed, lwa4p::links(), sensors, logs, periods, seed, &[])
 }
 
-/// As [`record`], at a share of the velocity, with other friction.
+/// Like [`record`], at a share of the velocity, with other friction.
 pub(super) fn record_slow(
     share: f64,
     friction: Vec<TanhFriction<f64>>,
@@ -43,7 +43,7 @@ pub(super) fn record_slow(
     record_on(&plant, logs, 2, seed, |_| 0.25 * share)
 }
 
-/// As [`record_slow`], with other links under any gravity in the base frame, and some joints held still.
+/// Like [`record_slow`], with other links under any gravity in the base frame, and some joints held still.
 pub(super) fn record_mounted(
     gravity: [f64; 3],
     links: Vec<Body>,

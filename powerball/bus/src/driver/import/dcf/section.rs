@@ -1,4 +1,4 @@
-//! The sections of a file, and what the section of an object says.
+//! The sections of a file, and the content of the section of an object.
 
 use super::value::{NoNumber, Number};
 use super::{Access, DcfError, Value, Variable};

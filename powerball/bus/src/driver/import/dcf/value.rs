@@ -65,7 +65,7 @@ fn unsigned(digits: &str) -> Option<u64> {
     }
 }
 
-/// A text that should be a number and is none.
+/// A text that should be a number and is not one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct NoNumber;
 
