@@ -115,7 +115,7 @@ impl Evaluator {
     /// takes [`Evaluator::outputs`] numbers a sample. `drive` is q̈, or τ for forward dynamics.
     ///
     /// # Panics
-    /// As [`Evaluator::run`].
+    /// Those of [`Evaluator::run`].
     pub fn evaluate(&self, q: &[f64], dq: &[f64], drive: &[f64], parameters: &[f64], out: &mut [f64]) {
         self.run(&Samples { q, dq, ddq: drive, tau: drive, parameters, ..Samples::default() }, out);
     }

@@ -26,7 +26,7 @@ pub(super) struct Motors {
     pub(super) left_out: Vec<String>,
 }
 
-/// A spring of a joint or a tendon: stiffness·(q − rest) is what the motor has to bring up.
+/// A spring of a joint or a tendon: stiffness·(q − rest) is the torque that the motor must supply.
 #[derive(Debug)]
 pub(super) struct Spring {
     /// N·m/rad or N/m; positive.

@@ -3,7 +3,7 @@
 use crate::arm::Arm;
 use serde_json::Value;
 
-/// An additional torque that the motor of a joint has to bring up, N·m or N: a coefficient times a law of the
+/// An additional torque that the motor of a joint must supply, N·m or N: a coefficient times a law of the
 /// joint's motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Term {

@@ -67,7 +67,7 @@ impl fmt::Display for ArmError {
             }
             ArmError::Stopped(cause, details) => write!(f, "the arm was stopped: {cause}; {details}"),
             ArmError::Slow(wanted, now) => {
-                write!(f, "in time the driver was not in this state: {wanted}; it {now}")
+                write!(f, "timeout: expected that the driver {wanted}, but it {now}")
             }
             ArmError::Bus(e) => e.fmt(f),
         }

@@ -99,7 +99,7 @@ pub enum PlantEffect {
         /// Position at which the friction is highest, rad.
         place: f64,
     },
-    /// Somebody bolts something to the flange.
+    /// A payload is bolted to the flange.
     Payload {
         /// Mass, kg.
         mass: f64,
@@ -135,7 +135,7 @@ pub enum PlantEffect {
         /// Time constant of warming, s.
         time_constant: f64,
     },
-    /// The drive's current-to-torque factor is not what its file says.
+    /// The drive's current-to-torque factor differs from that of its file.
     TorqueConstant {
         /// The joint.
         joint: usize,
@@ -147,7 +147,7 @@ pub enum PlantEffect {
         /// Delay, s.
         delay: f64,
     },
-    /// A joint's zero is off.
+    /// A joint's encoder has a wrong zero.
     EncoderOffset {
         /// The joint.
         joint: usize,
@@ -159,13 +159,13 @@ pub enum PlantEffect {
         /// Rotation of the base about its x and y axes, rad.
         tilt: [f64; 2],
     },
-    /// Something leans against the last link, again and again.
+    /// An obstacle or a person pushes the last link repeatedly.
     ContactWrench {
         /// Force at the last frame's origin in the base frame, N.
         force: [f64; 3],
-        /// The first time, s.
+        /// Time of the first push, s.
         start: f64,
-        /// How long each time, s.
+        /// Duration of each push, s.
         length: f64,
         /// Time between two pushes, s.
         every: f64,
