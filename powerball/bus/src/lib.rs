@@ -1,7 +1,7 @@
 //! The arm on its CAN bus: CANopen and the drive profile as values, the driver above them, and ways to a bus.
 //!
 //! [`canopen`], [`cia402`] and [`driver`] need no `std`: frames go in and out, and time is handed in.
-//! [`transport`] is where frames really travel.
+//! [`transport`] sends and receives the frames.
 
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 

@@ -87,7 +87,7 @@ impl<T: RealField + Copy, const P: usize> SquareRoot<T, P> {
         true
     }
 
-    /// The parameters that fit best; `None` where the rows leave one of them open (with a prior of 0).
+    /// The parameters that fit best; `None` if the rows do not determine one of them (with a prior of 0).
     #[must_use]
     pub fn estimate(&self) -> Option<SVector<T, P>> {
         let mut x = self.z;

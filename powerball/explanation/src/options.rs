@@ -48,7 +48,7 @@ pub enum ExplainError {
     /// The arm's dynamics cannot be derived, or those of the arm that was found.
     #[error("{0}")]
     Arm(#[source] dyngen::Error),
-    /// The known model, or what was found, changes the arm in a way that it cannot be changed.
+    /// The known model, or the result, has a change that is impossible for the arm.
     #[error("{0}")]
     Changes(#[source] Unchanged),
     /// The known model is another arm's.

@@ -38,7 +38,7 @@ impl SyncProducer {
         self.next = Some(now);
     }
 
-    /// No more.
+    /// Stops the SYNCs.
     pub fn stop(&mut self) {
         self.next = None;
     }
@@ -97,7 +97,7 @@ impl HeartbeatProducer {
     }
 }
 
-/// Whether another one's heartbeat still comes.
+/// Watches the heartbeat of another node.
 #[derive(Clone, Copy, Debug)]
 pub struct HeartbeatConsumer {
     timeout: Micros,

@@ -2,13 +2,13 @@
 
 use core::fmt;
 
-/// States of a drive. An unknown pattern is a value of its own: taking it for a fault, or for anything else,
+/// States of a drive. An unknown pattern is a separate value: to treat it as a fault, or as any other state,
 /// would be a guess.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum State {
     /// Self-test, after power-up.
     NotReadyToSwitchOn,
-    /// No power to the motor may be had.
+    /// Power to the motor cannot be switched on.
     SwitchOnDisabled,
     /// Power may be switched on.
     ReadyToSwitchOn,

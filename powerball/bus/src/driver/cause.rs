@@ -116,7 +116,7 @@ pub enum Cause {
     Stuck(NodeId, f64),
     /// A measured position jumped: by how much, and what its greatest velocity explains, rad.
     PositionJump(NodeId, f64, f64),
-    /// A joint was measured beyond its limits: where, and the limit with its tolerance, rad.
+    /// A joint was measured beyond its limits: its position, and the limit with its tolerance, rad.
     PositionLimit(NodeId, f64, f64),
     /// A joint's current stays at its limit: current and limit, A.
     TorqueLimit(NodeId, f64, f64),
@@ -127,8 +127,8 @@ pub enum Cause {
     Overspeed(JointNumber, f64, f64),
     /// Current mode: velocities of a joint that no joint can have, one after the other; the last one, rad/s.
     ImplausibleVelocity(NodeId, JointNumber, f64),
-    /// Current mode: a joint's position is off its integrated velocity by this much, rad: one of the two is
-    /// wrong.
+    /// Current mode: a joint's position differs from its integrated velocity by this much, rad: one of the
+    /// two is wrong.
     PositionAgainstVelocity(NodeId, JointNumber, f64),
     /// Current mode: a joint's current is not the commanded one: measured and commanded, A.
     CurrentError(NodeId, JointNumber, f64, f64),

@@ -1,4 +1,5 @@
-//! The SYNC cycle: what is judged when a cycle ends, when set-points leave, and which word goes with them.
+//! The SYNC cycle: the checks at its end, the time at which set-points are sent, and the controlword sent
+//! with them.
 
 use super::guard::Guard;
 use super::script::Progress;
@@ -10,11 +11,11 @@ use crate::cia402::{Command, Controlword, State, objects};
 use powerball_controller::JointNumber;
 
 impl<const N: usize> Driver<N> {
-    /// The set-points to act with the next SYNC, in rad, rad/s or A by the mode. Called again before the
-    /// slot, the last one counts.
+    /// The set-points to act with the next SYNC, in rad, rad/s or A by the mode. If it is called again before
+    /// the slot, the last call counts.
     ///
     /// # Errors
-    /// Where one of them may not leave. Then none does: the last ones are held for this cycle.
+    /// If one of them may not be sent. Then none is sent: the last ones are held for this cycle.
     pub fn set(&mut self, setpoints: &[f64; N]) -> Result<(), Rejection> {
         if self.phase != Phase::Running {
             return Err(Rejection::NotRunning);

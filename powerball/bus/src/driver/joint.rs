@@ -247,7 +247,7 @@ impl Joint {
     }
 
     /// Profile position's handshake: the word's bits and the target to send now. A target changes only with a
-    /// rising edge of "new set-point", which waits until the drive has let go of the last one.
+    /// rising edge of "new set-point", which waits until the drive has released the last one.
     pub(super) fn announce(&mut self, raw: i32) -> (u16, i32) {
         let acknowledged = self.status.is_some_and(|status| status.has(Statusword::MODE_12));
         if self.raised && acknowledged {
@@ -289,6 +289,6 @@ pub enum BusEvent {
     BusOff,
     /// A frame that was queued could not be sent.
     TransmitQueueFull,
-    /// Received frames were lost before they came here: a warning. What is missed of them is judged by itself.
+    /// Received frames were lost before they came here: a warning. Missing data is judged separately.
     Overrun,
 }

@@ -314,12 +314,12 @@ impl<const N: usize> Driver<N> {
     }
 
     /// Boots, identifies, configures and verifies all nodes for `control`; the driver is [`Phase::Ready`]
-    /// then. Possible when idle and when ready (to change the mode). `accept_unverified` is the caller's word
-    /// that a mode which was never seen on the arm itself may be tried.
+    /// then. Possible when idle and when ready (to change the mode). With `accept_unverified` the caller
+    /// allows a mode that was never verified on the arm itself.
     ///
     /// # Errors
-    /// Where this is not the time, nothing is known of the mode, it is the current mode unverified and not
-    /// accepted, or the bus could not carry it.
+    /// If the phase does not allow it, the profile does not have the mode, it is the unverified current mode
+    /// and not accepted, or the bus load would be too high.
     pub fn start(&mut self, control: ControlMode, accept_unverified: bool) -> Result<Verdict, Refusal> {
         match self.phase {
             Phase::Idle | Phase::Ready => {}

@@ -178,7 +178,7 @@ pub struct TorqueMode {
     pub current_error: f64,
     /// The torque that acted may be off what the model needs for the measured motion by this part of the joint's torque, …
     pub torque_error: f64,
-    /// … or, where that is less, by what this part of its greatest acceleration takes of its own inertia, …
+    /// … or, if that is less, by the torque of its own inertia at this part of its greatest acceleration, …
     pub acceleration_error: f64,
     /// … this part of the torque of weight and Coriolis forces, …
     pub rigid_error: f64,
@@ -273,7 +273,7 @@ pub struct Profile<const N: usize> {
     pub sync_timeout_factor: Option<u8>,
     /// Period of the drives' heartbeats, 0x1017, ms.
     pub node_heartbeat_ms: u16,
-    /// Profile position. Each of the modes is `None` where the drive has it not or nothing is known of it.
+    /// Profile position. Each of the modes is `None` if the drive does not have it or nothing is known of it.
     pub profile_position: Option<ModeProfile>,
     /// Velocity.
     pub velocity: Option<ModeProfile>,

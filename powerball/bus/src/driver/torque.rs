@@ -128,8 +128,9 @@ impl Demand {
     }
 
     /// The extrapolated position for a cycle without a new one: with the last velocity and acceleration,
-    /// within the limits of both. Not back: what slows down comes to rest, and what rests stays. What could
-    /// not come to rest any more before the end of its range (`position`, rad) brakes.
+    /// within the limits of both. It does not reverse: a joint that slows down comes to rest, and a joint at
+    /// rest stays. A joint that could no longer come to rest before the end of its range (`position`, rad)
+    /// brakes.
     pub(super) fn next(&self, period: f64, position: [f64; 2], velocity: f64, acceleration: f64) -> f64 {
         let v = self.velocity(period);
         let before = (self.points[1] - self.points[2]) / period;

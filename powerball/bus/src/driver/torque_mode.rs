@@ -267,7 +267,8 @@ impl<const N: usize> Driver<N> {
         Some(Cause::TorqueError(self.node(j), JointNumber::from_index(j), left, tolerance))
     }
 
-    /// Once a cycle, in current mode: a joint that is off its path, or has another current than commanded.
+    /// Called once a cycle in current mode: finds a joint that is off its path, or has another current than
+    /// commanded.
     pub(super) fn not_obeying(&mut self, j: usize) -> Option<Cause> {
         let (limits, node, number) =
             (self.profile.reactions.torque_mode, self.node(j), JointNumber::from_index(j));

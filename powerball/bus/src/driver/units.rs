@@ -36,9 +36,9 @@ pub fn to_i32(value: f64) -> Saturated<i32> {
 pub struct JointUnits {
     /// Counts of position in a radian; negative where the drive counts against the joint.
     pub counts_per_radian: f64,
-    /// Rated current, A, where the drive's own 0x6075 is not to be had: the scale of 0x6077.
+    /// Rated current, A, if the drive's own 0x6075 is not available: the scale of 0x6077.
     pub rated_current: f64,
-    /// Joint torque, N·m, at the rated current, with its sign: a calibration, no constant of nature. The
+    /// Joint torque, N·m, at the rated current, with its sign: it comes from a calibration. The
     /// torque constant is this over the rated current.
     pub rated_torque: f64,
     /// Whether `rated_torque` was measured on this arm.

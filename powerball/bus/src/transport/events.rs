@@ -25,7 +25,7 @@ impl<const N: usize> Observed<N> {
         Observed { phase: driver.phase(), states: states(driver), note: driver.notes().last().copied() }
     }
 
-    /// Says what has changed.
+    /// Reports the changes since the last call.
     pub(super) fn compare(&mut self, driver: &Driver<N>) {
         self.notes(driver);
         let states = states(driver);

@@ -17,7 +17,7 @@ const STOP: Micros = 5_000_000;
 ///
 /// However a program leaves it, by an error, a panic or a signal ([`Master::with_interrupt`]), the arm is
 /// stopped: a master that is dropped while joints may have torque sends quick stop, closes the brakes, takes
-/// the torque away and ends the drives' watch on it. Where a program dies without leaving it (SIGKILL, an
+/// the torque away and ends the drives' watch on it. If a program dies without leaving it (SIGKILL, an
 /// abort), a second process can send the stop (`Master::with_watchdog`); a machine that loses its power sends
 /// nothing, and then the drives' own watching stops them.
 #[derive(Debug)]
@@ -164,7 +164,7 @@ impl<B: Bus, const N: usize> Master<B, N> {
     /// Waits for the next thing to do, at most until `until`, and does it.
     ///
     /// # Errors
-    /// Where the bus is gone. A bus that is off or full is the driver's to judge.
+    /// If the bus no longer exists. The driver handles a bus that is off or full.
     pub fn step(&mut self, until: Micros) -> Result<Moment, BusError> {
         let deadline = self.driver.deadline().min(until);
         let received = self.bus.receive(deadline)?;

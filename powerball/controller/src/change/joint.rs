@@ -55,7 +55,7 @@ impl<T: RealField + Copy> Whitener<T> {
 pub struct Innovation<T> {
     /// z less the friction that was followed.
     pub value: T,
-    /// m: by how much its mean may differ from zero without a change.
+    /// m: allowed difference of its mean from zero without a change.
     pub allowed: T,
     /// The friction through the joint's colour, over σ.
     pub friction: T,
@@ -88,7 +88,7 @@ impl<T: RealField + Copy> Joint<T> {
         &self.colour
     }
 
-    /// Forgets what came before a gap; friction stays as it was followed.
+    /// Clears the samples before a gap; the followed friction is kept.
     pub fn interrupt(&mut self) {
         self.residual.interrupt();
         self.friction.interrupt();

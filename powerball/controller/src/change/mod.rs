@@ -67,7 +67,7 @@ pub struct Standing<T> {
 pub struct Alarm<T> {
     /// The place of the bet that says most.
     pub bet: usize,
-    /// The number of the sample with which the change began, as the bets were given it.
+    /// The number of the sample at which the change began, in the numbering of the bets.
     pub since: u64,
     /// The average capital of all bets over the level.
     pub capital: T,

@@ -7,11 +7,13 @@ use nalgebra::{RealField, SVector};
 /// Cycles in a row above the level: one alone can be a sensor's.
 const CYCLES: u8 = 2;
 
-/// Says that something touches the arm: an external torque of the momentum observer above a level that goes with the motion
-/// (dynamic thresholds: Haddadin, De Luca, Albu-Schäffer, *Robot collisions: a survey*, T-RO 33, 2017, §V).
+/// Detects contact with the arm: an external torque of the momentum observer above a level that goes with the
+/// motion (dynamic thresholds: Haddadin, De Luca, Albu-Schäffer, *Robot collisions: a survey*, T-RO 33, 2017,
+/// §V).
 ///
-/// level = `noise` + `friction`·|f(q̇)| + `sticking`·(γ1 + γ3)·(1 − (f(q̇)/f_C)²) + `rigid`·|τ_rigid|, by joint: friction is
-/// known to a share, and a joint that rests may be held by all of its dry friction.
+/// level = `noise` + `friction`·|f(q̇)| + `sticking`·(γ1 + γ3)·(1 − (f(q̇)/f_C)²) + `rigid`·|τ_rigid|, by
+/// joint: friction is known to within a share of it, and a joint that rests may be held by all of its dry
+/// friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactDetector<T, const N: usize> {
     /// Output of the observer at rest and without contact, N·m, by joint.

@@ -4,7 +4,7 @@ use nalgebra::{RealField, SVector};
 
 /// Cuts torques to what joints have and to how fast it may change; the last stage of every controller.
 ///
-/// What is not a number is replaced by the last torque.
+/// NaN is replaced by the last torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limiter<T, const N: usize> {
     /// Greatest torque by joint, N·m.

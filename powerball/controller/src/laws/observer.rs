@@ -7,8 +7,9 @@ use nalgebra::{Matrix6, RealField, SMatrix, SVector, Vector6};
 /// r = K·(p − ∫(τ + Cᵀ·q̇ − g + r)dt − p(0)) with p = B·q̇ (De Luca and Mattone, *Sensorless robot collision detection and
 /// hybrid force/motion control*, ICRA 2005; Haddadin, De Luca, Albu-Schäffer, *Robot collisions: a survey*, T-RO 33, 2017).
 ///
-/// ṙ = K·(τ_ext − r): each joint's external torque through a low pass of its own, for any motion, without acceleration. What
-/// the model is wrong by counts as external, friction among it, so give it τ less the friction of the model.
+/// ṙ = K·(τ_ext − r): each joint's external torque through a low pass of its own, for any motion, without
+/// acceleration. Errors of the model count as external torque, friction included, so give it τ less the
+/// friction of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MomentumObserver<T, const N: usize> {
     /// Angular frequency of the low pass, rad/s.
@@ -26,8 +27,9 @@ impl<T: RealField + Copy, const N: usize> MomentumObserver<T, N> {
         MomentumObserver { bandwidth, momentum: None, drift: none, external: none }
     }
 
-    /// A cycle later, by `period` s: the state now, and the torque on the rigid arm that acted since the last call
-    /// (motor torque less friction and effects), N·m. Gives the external torques, N·m. The first call only begins.
+    /// Called once a cycle of `period` s with the present state and the torque on the rigid arm that acted
+    /// since the last call (motor torque less friction and effects), N·m. Returns the external torques, N·m.
+    /// The first call only initialises.
     ///
     /// Discretised with the exact pole e^(−K·T); Cᵀq̇ − g by the trapezoidal rule. A state that is not a
     /// number changes nothing.

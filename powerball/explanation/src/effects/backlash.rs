@@ -6,8 +6,8 @@ use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
 use powerball_controller::correction::Law;
 use serde::Serialize;
 
-/// A link that friction holds is not felt while the motor crosses the gap; a free one flies through it where
-/// its load turns; one that is loaded slowly is off from the motor by half the gap.
+/// While the motor crosses the gap, it does not move a link that friction holds; a free link flies through
+/// the gap where its load reverses; a slowly loaded link differs from the motor by half the gap.
 pub(super) struct Backlash;
 
 /// The visible part of the backlash.

@@ -36,7 +36,7 @@ impl Window {
         if ends.iter().all(Option::is_none) { Vec::new() } else { ends }
     }
 
-    /// Whether another one of the same log has a part of its time.
+    /// Whether another window of the same log overlaps it in time.
     #[must_use]
     pub fn overlaps(&self, other: &Window) -> bool {
         self.log == other.log && self.from < other.to && other.from < self.to
@@ -87,7 +87,7 @@ impl Candidate {
         self.joints.iter().any(|j| joints.contains(j))
     }
 
-    /// Whether it and another one are the same thing twice (see [`Effect::excludes`]).
+    /// Whether it and another candidate describe the same cause (see [`Effect::excludes`]).
     #[must_use]
     pub fn excludes(&self, other: &Candidate) -> bool {
         self.effect() == other.effect() && self.effect().excludes(self, other)
@@ -134,7 +134,7 @@ pub enum Axis {
     /// How far the joint has come since it turned back, up to several times this way, rad or m; the residual
     /// is taken against the direction of motion.
     Travel(f64),
-    /// How fast the rigid arm's torque changes.
+    /// The rate of the rigid arm's torque.
     TorqueRate,
     /// Running time; the residual is taken against the direction of motion.
     Warmth,

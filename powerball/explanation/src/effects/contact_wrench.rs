@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// does, or of any shape and direction over time.
 pub(super) struct ContactWrench;
 
-/// How its force goes through its windows.
+/// The course of its force within its windows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Settings {
     /// The force is constant from the window's beginning to its end.
@@ -32,7 +32,7 @@ pub enum Settings {
 pub struct Figures {
     /// When it ended, in the log's own t, s.
     pub end_time: Vec<f64>,
-    /// The force in the base frame, N; of one that changes the largest.
+    /// The force in the base frame, N; the largest value of a changing force.
     pub force: Vec<Vec<f64>>,
     /// The assumed point of action, on the tool. At another point of the link the force has another size.
     pub point: Vec<Point>,

@@ -60,8 +60,8 @@ pub enum Part {
 
 /// A physical term that a model may lack.
 ///
-/// A candidate that is given to an effect is one of its own; for another effect's candidate it gives nothing
-/// (no columns, no laws, nothing near it).
+/// An effect is called with its own candidates; for another effect's candidate it returns nothing (no
+/// columns, no laws, nothing near it).
 pub trait Effect: Sync {
     // Properties of the effect.
 

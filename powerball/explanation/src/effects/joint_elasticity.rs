@@ -12,8 +12,8 @@ pub(super) struct JointElasticity;
 /// Settings of this effect: the point at which the change of torque is taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// The compliance 1/K that it is taken about, rad/(N·m); `None` while nothing is known of it, when the
-    /// change is taken to first order.
+    /// The compliance 1/K about which it is taken, rad/(N·m); `None` while it is unknown: then the change is
+    /// taken to first order.
     pub about: Option<f64>,
 }
 

@@ -100,7 +100,7 @@ impl OfModel {
     }
 }
 
-/// Values by something with a law of the motion alone: whatever the model becomes, they stay as they are.
+/// Values by a key with a law of the motion alone: changes of the model do not change them.
 #[derive(Debug)]
 pub(super) struct ByLaw<K, V> {
     made: Mutex<Laws<K, V>>,
@@ -126,8 +126,8 @@ impl<K, V> Default for ByLaw<K, V> {
 }
 
 impl<K: PartialEq, V: Size> ByLaw<K, V> {
-    /// The values of a law; `make` makes them where they have not been made. Laws of torques change with the
-    /// model and are made each time.
+    /// The values of a law; `make` computes them at the first use. Laws of torques change with the model and
+    /// are computed each time.
     pub(super) fn get(&self, key: (K, Law<f64>), make: impl FnOnce() -> V) -> Arc<V> {
         if key.1.needs_torque() {
             return Arc::new(make());

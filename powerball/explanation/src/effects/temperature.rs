@@ -49,7 +49,7 @@ pub enum Warmth {
 pub struct Figures {
     /// Change from cold to warm (or over 10 K), as a share of the cold friction.
     pub change: ByJoint,
-    /// T, s; 0 where the change follows a logged temperature.
+    /// Time constant T, s; 0 if the change follows a logged temperature.
     pub time_constant: ByJoint,
 }
 

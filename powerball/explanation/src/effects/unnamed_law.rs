@@ -22,7 +22,7 @@ pub(super) struct UnnamedLaw;
 pub struct Settings {
     /// The terms of the series.
     pub form: Form,
-    /// Whether it has a part of its own that a constant torque or a spring of its joint could be.
+    /// Whether it contains a part that a constant torque or a spring of its joint could explain.
     pub whole: bool,
 }
 

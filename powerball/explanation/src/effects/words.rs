@@ -5,7 +5,7 @@ use super::ByJoint;
 /// How the figures of an effect are written.
 #[derive(Clone, Copy, Debug)]
 pub struct Words<'a> {
-    /// Whether its joints slide, so that torques are forces and angles are ways.
+    /// Whether its joints slide, so that torques are forces and angles are distances.
     pub slides: bool,
     /// Standard errors of its sizes, each a share of it; `None` where none is known.
     pub relative_std: &'a [Option<f64>],

@@ -1,7 +1,7 @@
 //! The decision between two models by old and new logs.
 //!
 //! Both are fitted to all logs that may be fitted. Block by block the χ² of the one is taken from that of the
-//! other; blocks count as independent, so their sum has an honest error whatever colour the residual has
+//! other; blocks count as independent, so the error of their sum is valid for any colour of the residual
 //! (Vuong, Likelihood ratio tests for model selection and non-nested hypotheses, Econometrica 1989, with
 //! blocks in the place of samples).
 //!
@@ -149,8 +149,8 @@ const GAP: f64 = 0.5;
 /// Assumed pause between the end of the last log and the new one, s.
 const PAUSE: f64 = 5.0;
 
-/// Splits a new log into what may be fitted and what is held out, and puts it behind all others: on their
-/// common clock where they have one, else by a clock of its own.
+/// Splits a new log into a part to fit and a held-out part, and places it after all others: on their common
+/// clock if they have one, else with a separate clock.
 #[must_use]
 pub fn split_off(mut new: Log, others: &[&Log]) -> (Log, Log) {
     let end = others.iter().filter_map(|log| log.t.last().map(|t| t + log.clock)).fold(0.0, f64::max);

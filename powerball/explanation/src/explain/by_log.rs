@@ -14,7 +14,7 @@ use powerball_logs::regression::{Column, Data, Signals};
 use powerball_logs::vector::dot;
 use std::ops::Range;
 
-/// Something that changed in one log.
+/// A change in one log.
 #[derive(Clone, Debug)]
 pub(crate) struct Changed {
     /// The file of the log.
@@ -25,7 +25,7 @@ pub(crate) struct Changed {
     /// Size of the difference: of friction and of a gain relative, of a zero in N·m (N) or rad (m), of a
     /// delay in s.
     pub(crate) value: f64,
-    /// The share of what the squared error of its joints is larger in this log than in others that goes with it.
+    /// The share of the additional squared error of its joints in this log that this change explains.
     pub(crate) share: f64,
 }
 
@@ -46,7 +46,7 @@ const MOST_A_LOG: usize = 3;
 const OTHERS: usize = 3;
 const FAR: f64 = 3.0;
 
-/// The changes, surest first, and what stays with them, by side, joint and row.
+/// The changes, the most certain first, and the residual with them, by side, joint and row.
 pub(crate) fn changes(
     study: &Study<'_>,
     model: &Model,

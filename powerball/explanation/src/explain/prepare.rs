@@ -28,7 +28,7 @@ pub(super) enum Inertia {
 pub(super) enum ValidationOnly {
     /// It is.
     TakenOut,
-    /// The validation set is as it was logged.
+    /// The validation set is used as logged.
     Kept,
 }
 

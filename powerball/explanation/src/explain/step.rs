@@ -42,7 +42,7 @@ pub(super) struct Choice {
     before: Vec<f64>,
 }
 
-/// Screens, tests and compares; changes nothing.
+/// Screens, tests and compares candidates without a change of the model.
 pub(super) fn propose(study: &Study<'_>, model: &Model, number: usize, among: CandidateKind) -> Proposed {
     let context = model.context(study);
     let screen = Screen::new(&context);

@@ -59,7 +59,7 @@ impl Detector {
         self.seen.iter_mut().flatten().for_each(Seen::interrupt);
     }
 
-    /// Takes row `number` of all joints; whether one of them moves.
+    /// Takes row `number` of all joints; returns whether one of them moves.
     pub fn update<'r>(&mut self, row: impl IntoIterator<Item = Option<&'r Shown>>, number: u64) -> bool {
         let says: Vec<(usize, Says)> = self
             .seen

@@ -19,8 +19,9 @@ use powerball_logs::signal::resample::median_step;
 use std::path::{Path, PathBuf};
 
 impl TorqueModel {
-    /// Leaves in logs what a base model is to be fitted to: true positions, torques at their own time,
-    /// without the terms, which stay as they are known. `body` is the arm with the model's changes.
+    /// Removes the known torque from logs, so that a base model can be fitted: positions become true ones,
+    /// torques get their own time, and the terms, which keep their known values, are subtracted. `body` is
+    /// the arm with the model's changes.
     pub fn take_out(&self, body: &RigidArm, logs: &mut [Log]) {
         let Some(motors) = body.motors() else { return self.take_out_of(body, logs) };
         for log in logs {
@@ -256,7 +257,7 @@ impl KnownModel for ModelFile {
 
 // The arm of the file as a model has it.
 
-/// Why an arm cannot be changed as a model says.
+/// The reason why the changes of a model cannot be applied to an arm.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unchanged {
     /// A name that is not one of the arm's parameters.

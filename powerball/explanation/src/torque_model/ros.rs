@@ -13,7 +13,7 @@ impl TorqueModel {
     /// `arm` is the arm file's, without the model's changes.
     ///
     /// # Errors
-    /// Where the model's changes are another arm's.
+    /// If the model's changes are those of another arm.
     pub fn ros_parameters(&self, arm: &Arm) -> Result<String, super::Unchanged> {
         let arm = self.additions.arm_changes.of(arm)?;
         let mut text = String::new();

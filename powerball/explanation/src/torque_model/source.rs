@@ -42,7 +42,7 @@ pub struct ForC {
 /// Why there is no code.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum SourceError {
-    /// The model's changes are another arm's.
+    /// The model's changes are those of another arm.
     #[error("{0}")]
     Changes(Unchanged),
     /// The generator failed: code that cannot be proven is not emitted.

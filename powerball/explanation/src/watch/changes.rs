@@ -21,7 +21,7 @@ pub(super) enum Change {
 }
 
 impl Change {
-    /// Whether another one is the same with another size.
+    /// Whether another change is the same one with another size.
     pub(super) fn is_like(&self, other: &Change) -> bool {
         match (self, other) {
             (Change::Friction { joint: a, .. }, Change::Friction { joint: b, .. })

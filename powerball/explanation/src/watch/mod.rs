@@ -20,7 +20,8 @@ use powerball_logs::regression::RigidArm;
 use powerball_logs::signal::resample::median_step;
 use stream::Stream;
 
-/// Samples that say how many there are a second. A file is watched as a stream is: the same rows give the same events.
+/// Number of samples from which the sample rate is determined. A file is watched like a stream: the same rows
+/// give the same events.
 pub const FIRST: usize = 40;
 
 /// How a model is watched.

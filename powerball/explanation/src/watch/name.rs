@@ -149,8 +149,8 @@ impl<'a> Stretch<'a> {
     }
 
     /// The error of a residual on the stretch's rows beyond the usual from a time on, and its χ² there. A
-    /// block of [`BLOCK`] innovations counts by its sum: what changes is slow, and usual is what the margin
-    /// allows. Rows near `edges` do not count.
+    /// block of [`BLOCK`] innovations counts by its sum: changes are slow, and the margin defines the usual
+    /// error. Rows near `edges` do not count.
     pub(super) fn excess(&self, residual: &Signals, since: f64, edges: &[f64]) -> (f64, f64) {
         let (mut excess, mut square) = (0.0, 0.0);
         for (j, residual) in residual.iter().enumerate() {

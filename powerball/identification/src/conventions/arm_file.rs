@@ -31,12 +31,12 @@ const ALIKE: f64 = 1.1;
 /// Gravity nearer to the filed direction than this is a tilt of the base: its cosine.
 const TILT: f64 = 0.9;
 
-/// One thing that may be wrong with an arm file.
+/// One possible error of an arm file.
 #[derive(Clone, Debug)]
 pub(super) struct ArmChange {
-    /// The arm as it would be.
+    /// The arm with this change.
     pub(super) arm: Arm,
-    /// The changed line, and where it stands.
+    /// The changed line, and its place.
     pub(super) line: String,
     /// The present value of this line.
     pub(super) now: String,
@@ -51,8 +51,8 @@ pub(super) struct Better {
     pub(super) after: Vec<f64>,
 }
 
-/// The change of the arm file under which the logs fit best, where it is clear, and clearer than what was found of the
-/// columns.
+/// The change of the arm file under which the logs fit best, if it is clear, and clearer than the findings
+/// about the columns.
 pub(super) fn better(asked: &Asked<'_>, found: &Found<'_>) -> Option<Better> {
     let arm = asked.body.arm();
     let worst = shares(&found.judged).into_iter().filter(|share| share.is_finite()).fold(0.0, f64::max);

@@ -123,7 +123,7 @@ fn fit(rows: &Rows<'_>, sums: &[[Sums; 2]], part: usize, ridge: f64) -> PartFit 
 }
 
 /// The factors κ by joint with which the inertial torque of one body comes nearest to every joint's torque in
-/// a part, with friction added: Gauss–Newton steps for body and factors together, factors held back where
+/// a part, with friction added: Gauss–Newton steps for body and factors together, factors are damped where
 /// nothing determines them.
 pub(super) fn factors_of_body(rows: &Rows<'_>, read: &Torques, part: usize, ridge: f64) -> Vec<f64> {
     let (n, size, inertial) = (rows.dof(), rows.size(), rows.inertial());

@@ -128,7 +128,7 @@ pub struct Answer {
 }
 
 impl Conventions {
-    /// Whether some column is surely not what it is declared to be.
+    /// Whether some column certainly differs from its declaration.
     #[must_use]
     pub fn differ(&self) -> bool {
         self.answers.iter().any(|answer| answer.as_said == Some(false))
@@ -170,7 +170,7 @@ impl Conventions {
         wrong.map(|answer| answer.sentence.as_str()).collect::<Vec<_>>().join(" ")
     }
 
-    /// The line that comes first: what is wrong with the columns or the arm file, or that they are as they should be.
+    /// The first line: the errors of the columns or the arm file, or that they are correct.
     #[must_use]
     pub fn verdict(&self) -> String {
         let wrong = self.wrong();

@@ -37,7 +37,7 @@ const RIDGES: [f64; 5] = [1e-6, 1e-4, 1e-3, 1e-2, 1e-1];
 #[derive(Clone, Debug)]
 pub(super) struct Step {
     pub(super) change: Change,
-    /// Another change that would do as well.
+    /// Another change that fits as well.
     pub(super) rival: Option<Change>,
     pub(super) before: Vec<f64>,
     pub(super) after: Vec<f64>,
@@ -335,9 +335,9 @@ pub(super) fn gravity_is(asked: &Asked<'_>, found: &Found<'_>) -> Option<Gravity
     (worse(0) && worse(1) && gain(&without, &with) > 0.0).then_some(GravityIs::Included)
 }
 
-/// Whether torques that hold hardly any weight hold what there is of it: determined where without gravity's
-/// columns the fit is worse, as the mean over joints, both ways round; or no worse, both ways round. Between
-/// them a balanced arm may carry something in one part of the logs.
+/// Whether torques with hardly any weight contain gravity: this is determined if the fit without gravity's
+/// columns is worse, as the mean over joints, both ways round; or not worse, both ways round. Between these
+/// cases a balanced arm may carry a body in one part of the logs.
 pub(super) fn little_gravity_is(asked: &Asked<'_>, found: &Found<'_>) -> Option<GravityIs> {
     let Some((with, without)) = with_and_without_gravity(asked, found) else {
         return Some(GravityIs::TakenOut);

@@ -3,9 +3,9 @@
 use super::solve::{NormalEquations, Solver};
 use faer::Mat;
 
-/// Least squares from normal equations with some coefficients ≥ 0 (Lawson and Hanson, Solving Least Squares Problems,
-/// 1974, ch. 23). Each coefficient that is let free lowers the error, so that no set comes twice: the optimum is
-/// reached after finitely many steps.
+/// Least squares from normal equations with some coefficients ≥ 0 (Lawson and Hanson, Solving Least Squares
+/// Problems, 1974, ch. 23). Each coefficient that is set free lowers the error, so that no set occurs twice:
+/// the optimum is reached after finitely many steps.
 ///
 /// Returns the solution and the factor over the columns that are free.
 #[must_use]

@@ -32,7 +32,7 @@ impl Together {
     /// Joins logs that were reduced under the gravity of their mounting.
     ///
     /// # Errors
-    /// Why they are not logs of one arm, or why its set is not to be had.
+    /// Why they are not logs of one arm, or why its set cannot be derived.
     pub fn new(mountings: &[(&RigidArm, &Bands)]) -> Result<Together, String> {
         let arms: Vec<&Arm> = mountings.iter().map(|(body, _)| body.arm()).collect();
         let general = together(&arms)?;

@@ -76,8 +76,8 @@ impl Solver {
         out
     }
 
-    /// The products A'c of a column with the kept ones, turned so that c'A (A'A)⁻¹ A'd of two columns is the scalar
-    /// product of what comes of both: L⁻¹ A'c.
+    /// The products A'c of a column with the kept ones, turned so that c'A (A'A)⁻¹ A'd of two columns is the
+    /// scalar product of both results: L⁻¹ A'c.
     #[must_use]
     pub fn whitened(&self, right: &[f64]) -> Vec<f64> {
         let mut x: Vec<f64> = self.kept.iter().zip(&self.scale).map(|(k, s)| right[*k] * s).collect();
@@ -129,7 +129,7 @@ pub struct NormalEquations {
     pub square: f64,
 }
 
-/// Σ aᵢ·bᵢ in the order of the rows: standard errors of nearly dependent columns hang on the last digits of
+/// Σ aᵢ·bᵢ in the order of the rows: standard errors of nearly dependent columns depend on the last digits of
 /// these sums.
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()

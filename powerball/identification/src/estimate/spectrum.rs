@@ -31,7 +31,7 @@ pub(super) struct Power {
     pub octave: usize,
     /// Mean square.
     pub mean: f64,
-    /// How many independent squares the mean is worth.
+    /// Equivalent number of independent squares in the mean.
     pub freedom: f64,
 }
 

@@ -32,10 +32,10 @@ pub enum Error {
                  --values (`dyngen import` writes ARM.values.json)"
     )]
     Limits(MissingLimits),
-    /// The arm's model or its regressor is not to be had.
+    /// The arm's model or its regressor cannot be derived.
     #[error("{0}")]
     Model(dyngen::Error),
-    /// A setting makes no sense: what is wrong with it.
+    /// A setting is invalid: the reason.
     #[error("{0}")]
     Setting(String),
     /// The arm touches itself or the floor in every pose.

@@ -134,7 +134,7 @@ pub fn optimise(model: &Model, kind: SetKind, settings: &Settings) -> Result<Exc
 /// Finds a path for each mounting such that they determine a parameter set together.
 ///
 /// # Errors
-/// A set that has no regressor, and as [`search_all`].
+/// A set that has no regressor, and those of [`search_all`].
 pub fn optimise_all(tasks: &[Task<'_>], kind: SetKind, settings: &Settings) -> Result<Excitation, Error> {
     check(settings)?;
     let models: Vec<&Model> = tasks.iter().map(|task| task.model).collect();

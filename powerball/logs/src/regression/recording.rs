@@ -65,7 +65,7 @@ impl Recording {
     /// Takes positions, velocities and accelerations from samples at times `t`, by joint, smoothed to
     /// `smoothing` Hz.
     ///
-    /// `false` where there are too few samples or no such filter; nothing has changed then.
+    /// `false` if there are too few samples or no such filter; nothing has changed then.
     pub fn follow(&mut self, t: &[f64], positions: &[&[f64]], smoothing: f64) -> bool {
         let Some(filter) = smoother(smoothing, self.rate) else { return false };
         if t.len() < 2 {

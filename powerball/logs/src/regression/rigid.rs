@@ -1,4 +1,4 @@
-//! The rigid arm of a file at run time: columns of its minimal set and of what lies outside it.
+//! The rigid arm of a file at run time: columns of its minimal set and of the parameters outside it.
 //!
 //! [`RigidArm`] also gives the parameters that a vertical gravity hides.
 

@@ -360,7 +360,7 @@ impl Bands {
         &self.bands[0]
     }
 
-    /// The logs with each joint in a band of its own.
+    /// The logs with a separate band for each joint.
     #[must_use]
     pub fn of_joints(&self, bands: &[usize]) -> Summary {
         let joint = |(j, band): (usize, &usize)| self.bands[*band].joints[j].clone();

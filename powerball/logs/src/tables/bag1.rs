@@ -11,7 +11,7 @@ pub(super) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 /// The first record of a bag fills this many bytes.
 const HEAD: u64 = 4096;
 
-/// Reads the topics of a bag; what is wrong with it.
+/// Reads the topics of a bag; returns a note about its fault.
 pub(super) fn read(path: &Path, topics: &mut Topics) -> io::Result<Vec<String>> {
     has_index(path)?;
     topics.holds(largest_chunk(path)?).map_err(io::Error::other)?;

@@ -36,7 +36,7 @@ struct Line<'a> {
 enum Of<'a> {
     /// A quantity of `/joint_states`, of a joint by its place and name.
     State(&'static str, usize, &'a str),
-    /// How fast a position changes, by its place.
+    /// The rate of a position, by its place.
     Rate(usize),
     /// A member of the torques of a joint.
     Torque(&'a str, &'static str),

@@ -84,7 +84,7 @@ impl<'s, S: Source> Cursor<'s, S> {
     }
 }
 
-/// Reads the topics of a file; what is wrong with it.
+/// Reads the topics of a file; returns a note about its fault.
 pub(super) fn read(path: &Path, topics: &mut Topics) -> io::Result<Vec<String>> {
     read_from(&mut File::open(path)?, topics)
 }
@@ -137,7 +137,7 @@ struct Records<'t> {
     messages: u64,
     /// Messages of topics that are read.
     taken: u64,
-    /// Whether a chunk was left where it is, with its index.
+    /// Whether a chunk was skipped, with its index.
     passed_over: bool,
     chunks: usize,
     /// Chunks that could not be read.

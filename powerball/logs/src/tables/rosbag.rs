@@ -11,7 +11,7 @@ use std::collections::HashMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Reads the topics of a bag; what is wrong with it.
+/// Reads the topics of a bag; returns a note about its fault.
 pub(super) fn read(path: &Path, topics: &mut Topics) -> io::Result<Vec<String>> {
     let bag = opened(path)?;
     // Of a file that was cut off, what is left is read.

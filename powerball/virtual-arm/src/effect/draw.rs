@@ -211,8 +211,8 @@ impl PlantEffect {
         "friction_by_position",
     ];
 
-    /// The names among which a seed chooses: a name that came later is not one of them, so that a seed still
-    /// chooses as it did.
+    /// The names among which a seed chooses: a name that was added later is not among them, so that a seed
+    /// keeps its choice.
     pub fn chosen_by_seed() -> &'static [&'static str] {
         &Self::NAMES[..18]
     }

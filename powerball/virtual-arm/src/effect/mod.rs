@@ -375,7 +375,7 @@ impl PlantEffect {
         }
     }
 
-    /// The joint whose friction the effect changes, where its torque may turn round within a small change of
+    /// The joint whose friction the effect changes, if its torque may reverse within a small change of
     /// velocity.
     pub(super) fn rubs_at(&self) -> Option<usize> {
         match self {

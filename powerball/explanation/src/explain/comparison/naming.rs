@@ -17,9 +17,9 @@ pub(crate) struct Comparison {
     pub(crate) rivals: Vec<Rival>,
     /// A name that fits as well.
     pub(crate) twin: Option<String>,
-    /// The name's score over that of the next best one that explains something else of the same residual. A
-    /// name that explains the same part is another word for it; one that explains another part as well as
-    /// this one is a sign that neither is true.
+    /// The name's score over that of the next best one that explains another part of the same residual. A
+    /// name that explains the same part is only another word for it; one that explains another part equally
+    /// well is a sign that neither is true.
     pub(crate) distinct_margin: f64,
     /// The joints on which they were compared.
     pub(crate) joints: Vec<JointNumber>,

@@ -164,9 +164,9 @@ fn octaves(signal: &[f64]) -> [Vec<f64>; OCTAVES] {
     })
 }
 
-/// The last accepted effect of which surely most is missing in some octave. Everything that fits must be
-/// in the model: what else is missing is seen as a change of size too. (A change by more than the effect
-/// itself is not its own.)
+/// The last accepted effect of which most is certainly missing in some octave. Everything that fits must be
+/// in the model before, because other missing effects also look like a change of size. (A change by more than
+/// the effect itself has another cause.)
 pub(crate) fn inconstant(study: &Study<'_>, model: &Model) -> Option<usize> {
     let rule = study.rule();
     let NormalEquations { gram, .. } = model.fit.normal_equations();

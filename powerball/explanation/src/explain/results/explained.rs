@@ -65,7 +65,7 @@ pub struct Explained {
     pub bands: Vec<f64>,
     /// How long the fitted logs are, s.
     pub fitted_time: f64,
-    /// Samples that the residuals are worth, all joints together.
+    /// Equivalent number of independent samples in the residuals, all joints together.
     pub effective_samples: usize,
     /// The part of the residual that no candidate explains.
     pub unattributed: Option<Unattributed>,
@@ -84,8 +84,8 @@ pub struct Explained {
     /// Torques over time on the validation set, by joint; not part of the JSON.
     #[serde(skip)]
     pub curves: Vec<TorqueCurve>,
-    /// The model with everything that was named: model.json. Its errors are `after`; not where each joint was
-    /// fitted by itself, as it has one body for all.
+    /// The model with all named effects: model.json. Its errors are `after`, except if each joint was fitted
+    /// by itself, because it has one body for all.
     #[serde(skip)]
     pub model: TorqueModel,
     /// The plots that show the effects; not part of the JSON.
@@ -217,8 +217,8 @@ pub struct Shown {
     pub signal: String,
     /// Whether torques are taken against the direction of motion: friction is then positive.
     pub against_motion: bool,
-    /// By row: the signal; the residual of the model without this effect but with all others; that with it;
-    /// what it adds.
+    /// By row: the signal; the residual of the model without this effect but with all others; the residual
+    /// with it; the torque of the effect.
     pub rows: Vec<[f64; 4]>,
     /// The columns of `rows` as means over equal shares of the rows, in the order of the signal; none over
     /// time.

@@ -19,7 +19,7 @@ use serde::Serialize;
 pub struct LogResult {
     /// The log's file.
     pub log: String,
-    /// Whether nothing was found in it that other logs have not, and the model predicts it as well as them.
+    /// Whether it has no difference from the other logs, and the model predicts it as well as them.
     pub like_the_others: bool,
     /// Squared error of a model of all logs on this log, mean over joints, divided by the largest one on
     /// another log; the differences are in the model.
@@ -39,8 +39,9 @@ pub struct Difference {
     pub start_time: f64,
     /// Until when, s.
     pub end_time: f64,
-    /// The share of the log's squared error, beyond that of the other logs, that goes with it; of a push on an arm that
-    /// stands still, whose rows are in no error, the share of its torques that one force explains.
+    /// The share of the log's squared error, beyond that of the other logs, that it explains; for a push on
+    /// an arm that stands still, whose rows are in no error, the share of its torques that one force
+    /// explains.
     pub share: f64,
     /// Size of the difference from the other logs: friction (`temperature`) and gains (`torque_constant`)
     /// relative, a zero of torques (`asymmetry`) in N·m or N, one of positions (`encoder_offset`) in rad or

@@ -230,7 +230,7 @@ pub(crate) fn depends_on(context: &Context<'_>, joint: usize) -> Vec<(String, f6
     found
 }
 
-/// For each value the share of the values that it lies in, in the order of size, as one of `count`.
+/// The quantile bin of each value, as one of `count` bins.
 #[must_use]
 pub(crate) fn quantile_bins(signal: &[f64], count: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..signal.len()).collect();

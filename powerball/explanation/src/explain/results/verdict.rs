@@ -35,7 +35,7 @@ pub enum State {
     /// Little of the torque is left ([`predicted_share`](crate::rule::Rule::predicted_share)).
     #[serde(rename = "predicted")]
     Predicted,
-    /// More is left, and what was named lowered the error: the 95 % interval of the change lies below zero.
+    /// More error remains, but the named effects lowered it: the 95 % interval of the change lies below zero.
     #[serde(rename = "improved")]
     Improved,
     /// More is left, and no error fell.
@@ -102,8 +102,8 @@ fn is_at_noise_floor(study: &Study<'_>, rms: f64, floor: f64) -> bool {
     rms <= study.rule().above_floor * floor
 }
 
-/// Whether of a joint so little is left that it needs no name, whatever that depends on; of one that does not move in the
-/// logs to judge on nothing is known.
+/// Whether the remaining error of a joint is so small that it needs no name; it is unknown for a joint that
+/// does not move in the validation logs.
 pub(super) fn needs_no_name(study: &Study<'_>, after: &ResidualStats, floor: &[f64], j: usize) -> bool {
     let little = after.relative[j] <= study.rule().little_share;
     !study.validation.joints[j].is_empty() && (little || is_at_noise_floor(study, after.rms[j], floor[j]))

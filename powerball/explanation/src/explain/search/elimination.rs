@@ -15,9 +15,9 @@ use powerball_logs::vector::dot;
 use std::ops::Range;
 use std::{mem, slice};
 
-/// Takes out one effect after the other, the weakest first, until every score is enough. Of an effect that
-/// has in it what every arm may have, only that stays where the rest is not enough: a spring whose rest lies
-/// far outside the travel is the zero of a torque sensor.
+/// Removes one effect after the other, the weakest first, until every score is sufficient. If an effect
+/// contains a term that every arm may have, and the other terms are not sufficient, only that term stays: a
+/// spring whose rest lies far outside the travel is the zero of a torque sensor.
 pub(crate) fn eliminate(study: &Study<'_>, model: &mut Model) {
     loop {
         if let Some(weakest) = weakest(study, model) {

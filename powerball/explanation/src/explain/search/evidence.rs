@@ -273,7 +273,7 @@ fn added(
 }
 
 /// The mean over joints of the logarithm of the squared error on the validation set, with a trial less
-/// without it: negative where the trial predicts better. No joint's unit or size rules it.
+/// without it: negative if the trial predicts better. It does not depend on the units or sizes of the joints.
 pub(crate) fn log_change(
     screen: &Screen<'_>,
     trial: &Trial,

@@ -91,7 +91,7 @@ pub(crate) enum CandidateKind {
     Laws,
 }
 
-/// Whether there is anything left in which a law without a name is worth a look.
+/// Whether the remaining error justifies a search for a law without a name.
 pub(crate) fn is_left(study: &Study<'_>, model: &Model) -> bool {
     let context = model.context(study);
     effects::all().iter().any(|effect| !effect.has_name() && !effect.candidates(&context).is_empty())

@@ -32,7 +32,8 @@ struct Surrogate {
 }
 
 /// The score that trials must exceed to be distinguished from chance: that of most of their surrogates. A
-/// push that is shifted in time may fall onto another one: of what is short, most must score less, not all.
+/// push that is shifted in time may fall onto another one: most surrogates of a short event must score less,
+/// not all.
 #[must_use]
 pub(crate) fn level_by_chance(screen: &Screen<'_>, trials: &[&Trial], short: bool, seed: u64) -> f64 {
     let rule = screen.context.rule;

@@ -100,8 +100,8 @@ impl Clock {
     }
 }
 
-/// When recordings were made, where the order of the files is all that is known of their time: what was taken, and
-/// both sets with it, where that is not as given.
+/// Chooses when recordings were made, if only the order of the files is known: the choice, and both sets with
+/// it, if it differs from the given order.
 pub(crate) fn choose_clock<'a>(
     rule: &Rule,
     logs: &[Log],
