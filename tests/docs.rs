@@ -97,7 +97,7 @@ const PLAIN: &str = "told: reported; beside: next to; bears: tolerates; errs: is
 const PLAIN_IN_SOURCES: &str = "untold: open; as above: the name of the item; speaks for: supports; \
     speak for: support; go on: continue; going on: continuing; hangs together: depends on each other; \
     what it errs: its error";
-/// Words of [`PLAIN`] that some sources still have, generated code and the documentation of commands among them.
+/// Words of [`PLAIN`] that some sources still have, generated code among them.
 const NOT_YET_IN_SOURCES: [&str; 3] = ["begun", "of others", "nobody builds what"];
 
 /// What `text` has of the words in `list`, with what to write in their place.
