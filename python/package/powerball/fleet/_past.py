@@ -1,0 +1,107 @@
+"""A unit against its own past: since when it is another one, with a stated rate of false alarms.
+
+The logs of a unit come by date. ``compare`` asks of each whether it differs from all before it, at the levels
+1e-2 to 1e-6; errors of both hold what varies from log to log. While nothing changes it says so in at most the
+share `level` of logs. So
+
+    e = 1/2 + 1/2 · mean over levels of [differs at this level]/level
+
+has at most the mean 1 given all before: it is a bet against "nothing has changed", at fair odds. The evidence
+of a unit is M ← e·(1 + M) with each of its logs, from 0 (Shiryaev and Roberts' form of an e-detector: Shin,
+Ramdas, Rinaldo 2022, as in ``powerball watch``). The sum of all units' M less the number of logs does not
+grow on average, so the mean number of logs *of the fleet* until any M reaches ``quiet`` is ``quiet`` or more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Dict, List, Mapping, Tuple
+
+from .. import _core
+from ..summary import summarize
+from ._fit import Extra, Fit, Json, compare
+from ._store import Row
+from ._work import Job, arm_of, fit_joined, fit_of, join, joined
+
+#: Where ``compare`` is asked.
+LEVELS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+
+
+@dataclass
+class Past:
+    """A unit over time."""
+
+    unit: str
+    #: The summary of its logs since it last changed, and how many these are.
+    key: str
+    count: int
+    #: Their fit.
+    fit: Fit
+    #: Each change: ``since`` and ``seen``, a log and its date each, and ``comparison`` of after with before.
+    changes: List[Json] = field(default_factory=list)
+
+
+def past_of(job: Job, rows: List[Row], extra: Mapping[str, Extra], level: float, quiet: float) -> Past:
+    """Follows a unit through its usable logs, sorted by date; ``extra`` varies from log to log."""
+    starts, seen, fit = _segments(job, rows, extra, quiet)
+    ends = [*starts[1:], len(rows)]
+    parts = [[row["key"] for row in rows[start:end]] for start, end in zip(starts, ends)]
+    fits = [fit_joined(job, part) for part in parts[:-1]] + [fit]
+    changes = []
+    for k in range(1, len(parts)):
+        sides = [_side(fits[i], extra, len(parts[i])) for i in (k - 1, k)]
+        since, alarm = rows[starts[k]], rows[seen[k - 1]]
+        changes.append(
+            {
+                "since": {"log": since["log"], "date": since["date"]},
+                "seen": {"log": alarm["log"], "date": alarm["date"]},
+                "logs_before": len(parts[k - 1]),
+                "logs_after": len(parts[k]),
+                "comparison": compare(sides[0], sides[1], level),
+            }
+        )
+    return Past(rows[0]["unit"], joined(job, parts[-1]), len(parts[-1]), fit, changes)
+
+
+def _segments(
+    job: Job, rows: List[Row], extra: Mapping[str, Extra], quiet: float
+) -> Tuple[List[int], List[int], Fit]:
+    """Where each stretch without a change begins, where each change was seen, the fit of the last stretch."""
+    arm = arm_of(job.arm)
+    starts, seen = [0], []  # type: List[int], List[int]
+    whole, past = join(job, [rows[0]["key"]]), Fit.of_row(rows[0])
+    since, evidence = 0, 0.0
+    for k in range(1, len(rows)):
+        if evidence < 1.0:
+            since = k
+        count = k - starts[-1]
+        evidence = (1.0 + evidence) * bet(_side(past, extra, count), _side(Fit.of_row(rows[k]), extra, 1))
+        if evidence >= quiet:
+            starts.append(since)
+            seen.append(k)
+            evidence = 0.0
+            whole = join(job, [row["key"] for row in rows[since : k + 1]])
+        else:
+            whole = summarize(arm, [whole, join(job, [rows[k]["key"]])])
+        past = fit_of(job, whole)
+    return starts, seen, past
+
+
+def bet(past: _core.ComparedSide, new: _core.ComparedSide) -> float:
+    """What a bet of 1 that nothing has changed makes of a log: at most 1 on average while that is true."""
+    won = 0.0
+    for level in LEVELS:
+        if not compare(past, new, level)["differ"]:
+            # What does not differ at one level does not at a stricter one.
+            break
+        won += 1.0 / level
+    return 0.5 + 0.5 * won / len(LEVELS)
+
+
+def _side(fit: Fit, extra: Mapping[str, Extra], count: int) -> _core.ComparedSide:
+    return fit.widened(of_mean(extra, count)).side()
+
+
+def of_mean(extra: Mapping[str, Extra], count: int) -> Dict[str, Extra]:
+    """What varies from log to log, in a fit of several."""
+    return {name: Extra(more.variance / count, more.freedom) for name, more in extra.items()}
