@@ -10,7 +10,7 @@ or, on a cluster of one's own:
 
     job = fleet.job("arm.toml", "s3://bucket/fleet")
     with Client("tcp://head:8786") as client:
-        fleet.update(client, job, ["s3://bucket/logs/**.mcap"])
+        fleet.update(client, job, ["s3://bucket/logs/**/*.mcap"])
         report = fleet.save(job, fleet.judge(client, job))
     print(report["odd"])
 

@@ -26,7 +26,7 @@ say otherwise.
 EPILOG = """\
 example:
   python -m powerball.fleet logs/ --arm arm.toml --store fleet
-  python -m powerball.fleet 's3://bucket/logs/**.mcap' --arm arm.toml --store s3://bucket/fleet \\
+  python -m powerball.fleet 's3://bucket/logs/**/*.mcap' --arm arm.toml --store s3://bucket/fleet \\
       --scheduler tcp://head:8786 --unit-pattern 'robot-([0-9]+)'
 
 files in the store:

@@ -130,18 +130,31 @@ class Fit:
                 return [(share, column) for share, column in shares if share]
         return []
 
-    def side(self) -> _core.ComparedSide:
-        """As one of two that are compared."""
+    def side(self, name: str) -> Side:
+        """As one of two that are compared; ``name`` is what messages call it."""
         with tempfile.TemporaryDirectory() as folder:
-            for name, parsed in (("identified", self.identified), ("covariance", self.covariance)):
-                with open(os.path.join(folder, f"{name}.json"), "w", encoding="utf-8") as file:
-                    json.dump(parsed, file)
-            return _core.ComparedSide.read(folder)
+            for file, parsed in (("identified", self.identified), ("covariance", self.covariance)):
+                with open(os.path.join(folder, f"{file}.json"), "w", encoding="utf-8") as opened:
+                    json.dump(parsed, opened)
+            return Side(name, folder, _core.ComparedSide.read(folder))
 
 
-def compare(a: _core.ComparedSide, b: _core.ComparedSide, level: float) -> Json:
+@dataclass(frozen=True)
+class Side:
+    """One of two fits that are compared."""
+
+    name: str
+    #: Where it was read from.
+    folder: str
+    core: _core.ComparedSide
+
+
+def compare(a: Side, b: Side, level: float) -> Json:
     """What ``powerball compare`` says of two fits: comparison.json."""
-    parsed: Json = json.loads(_core.compare(a, b, level).json())
+    text = _core.compare(a.core, b.core, level).json()
+    for side in (a, b):
+        text = text.replace(json.dumps(side.folder)[1:-1], side.name)
+    parsed: Json = json.loads(text)
     return parsed
 
 

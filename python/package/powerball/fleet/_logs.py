@@ -77,7 +77,12 @@ def _expanded(fs: Any, name: str, given: str) -> List[str]:
         return inside
     if fs.exists(name):
         return [name]
-    matching = [path for path in fs.glob(name) if not fs.isdir(path)] if re.search(r"[*?\[]", name) else []
+    try:
+        matching = (
+            [path for path in fs.glob(name) if not fs.isdir(path)] if re.search(r"[*?\[]", name) else []
+        )
+    except ValueError as why:
+        raise InputError(f"{given}: {why}") from None
     if not matching:
         raise InputError(f"{given}: no such log")
     return matching

@@ -17,11 +17,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Dict, List, Mapping, Tuple
 
-from .. import _core
-from ..summary import summarize
-from ._fit import Extra, Fit, Json, compare
+from ._fit import Extra, Fit, Json, Side, compare
 from ._store import Row
-from ._work import Job, arm_of, fit_joined, fit_of, join, joined
+from ._work import Growing, Job, fit_joined, joined
 
 #: Where ``compare`` is asked.
 LEVELS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
@@ -49,7 +47,9 @@ def past_of(job: Job, rows: List[Row], extra: Mapping[str, Extra], level: float,
     fits = [fit_joined(job, part) for part in parts[:-1]] + [fit]
     changes = []
     for k in range(1, len(parts)):
-        sides = [_side(fits[i], extra, len(parts[i])) for i in (k - 1, k)]
+        before, after = (
+            _side(fits[i], extra, len(parts[i]), name) for i, name in ((k - 1, "before"), (k, "after"))
+        )
         since, alarm = rows[starts[k]], rows[seen[k - 1]]
         changes.append(
             {
@@ -57,7 +57,7 @@ def past_of(job: Job, rows: List[Row], extra: Mapping[str, Extra], level: float,
                 "seen": {"log": alarm["log"], "date": alarm["date"]},
                 "logs_before": len(parts[k - 1]),
                 "logs_after": len(parts[k]),
-                "comparison": compare(sides[0], sides[1], level),
+                "comparison": compare(before, after, level),
             }
         )
     return Past(rows[0]["unit"], joined(job, parts[-1]), len(parts[-1]), fit, changes)
@@ -67,27 +67,26 @@ def _segments(
     job: Job, rows: List[Row], extra: Mapping[str, Extra], quiet: float
 ) -> Tuple[List[int], List[int], Fit]:
     """Where each stretch without a change begins, where each change was seen, the fit of the last stretch."""
-    arm = arm_of(job.arm)
+    keys = [row["key"] for row in rows]
     starts, seen = [0], []  # type: List[int], List[int]
-    whole, past = join(job, [rows[0]["key"]]), Fit.of_row(rows[0])
+    growing, past = Growing(job, keys), Fit.of_row(rows[0])
     since, evidence = 0, 0.0
     for k in range(1, len(rows)):
         if evidence < 1.0:
             since = k
         count = k - starts[-1]
-        evidence = (1.0 + evidence) * bet(_side(past, extra, count), _side(Fit.of_row(rows[k]), extra, 1))
+        evidence = (1.0 + evidence) * bet(
+            _side(past, extra, count, "past"), _side(Fit.of_row(rows[k]), extra, 1, "log")
+        )
         if evidence >= quiet:
             starts.append(since)
             seen.append(k)
-            evidence = 0.0
-            whole = join(job, [row["key"] for row in rows[since : k + 1]])
-        else:
-            whole = summarize(arm, [whole, join(job, [rows[k]["key"]])])
-        past = fit_of(job, whole)
+            evidence, growing = 0.0, Growing(job, keys[since:])
+        past = growing.fit(k + 1 - starts[-1])
     return starts, seen, past
 
 
-def bet(past: _core.ComparedSide, new: _core.ComparedSide) -> float:
+def bet(past: Side, new: Side) -> float:
     """What a bet of 1 that nothing has changed makes of a log: at most 1 on average while that is true."""
     won = 0.0
     for level in LEVELS:
@@ -98,8 +97,8 @@ def bet(past: _core.ComparedSide, new: _core.ComparedSide) -> float:
     return 0.5 + 0.5 * won / len(LEVELS)
 
 
-def _side(fit: Fit, extra: Mapping[str, Extra], count: int) -> _core.ComparedSide:
-    return fit.widened(of_mean(extra, count)).side()
+def _side(fit: Fit, extra: Mapping[str, Extra], count: int, name: str) -> Side:
+    return fit.widened(of_mean(extra, count)).side(name)
 
 
 def of_mean(extra: Mapping[str, Extra], count: int) -> Dict[str, Extra]:

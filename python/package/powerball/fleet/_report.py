@@ -114,6 +114,9 @@ def words(unit: Json) -> List[Tuple[str, str]]:
         said.append((f"its past, since {short(change['since']['date'])}", change["comparison"]["sentence"]))
     if unit["differs"]:
         said.append(("its type", unit["against_type"]["sentence"]))
+    compared = [change["comparison"] for change in unit["against_past"]] + [unit["against_type"] or {}]
+    for reason in dict.fromkeys(reason for one in compared for reason in one.get("unusable", [])):
+        said.append(("its type and its past", f"do not use this: {reason}."))
     return said
 
 

@@ -17,7 +17,9 @@ import numpy as np
 
 from .._arrays import Array
 
-#: Terms are cut here where units that are not like the others may be among them: two standard deviations.
+#: The median of a squared standard normal variable.
+_MEDIAN = NormalDist().inv_cdf(0.75) ** 2
+#: Terms are cut here where a few may be of another distribution: two standard deviations.
 _CUT = 4.0
 #: The mean of a squared standard normal variable that is cut there.
 _CUT_MEAN = math.erf(math.sqrt(2)) - 4 * NormalDist().pdf(2) + _CUT * 2 * (1 - NormalDist().cdf(2))
@@ -54,11 +56,11 @@ def between(values: Sequence[float], variances: Sequence[float]) -> Spread:
 
 
 def robust_between(values: Sequence[float], variances: Sequence[float]) -> Spread:
-    """As well, where a few of them may be anywhere: about the median, each term cut at two deviations."""
+    """As well, where a few of them may be anywhere: the median of the terms is its expectation."""
     y, v = np.asarray(values), np.asarray(variances)
     left = len(y) - 1.0
     middle = float(np.median(y))
-    t = _root(lambda t: _cut_sum((y - middle) ** 2, v + t), _CUT_MEAN * left, y, v)
+    t = _root(lambda t: float(np.median((y - middle) ** 2 / (v + t))), _MEDIAN, y, v)
     weight = float(np.sum(1 / (v + t)))
     return Spread(middle, weight**-0.5, math.sqrt(t), (0.0, math.inf), left)
 

@@ -19,7 +19,7 @@ from ._work import Job, fit_joined, joined
 #: With fewer units that are like each other no spread between them is known.
 LEAST = 4
 
-#: Summaries that are joined to one, so that all but one unit are few.
+#: Units whose summaries are joined to one, so that all units but one are few summaries.
 FAN_IN = 16
 
 #: Calls a function for each of some arguments, wherever it likes, and gives the results in their order.
@@ -34,8 +34,6 @@ class Typed:
     spread: Dict[str, Spread]
     #: What compare says of each unit; none where there are too few.
     comparison: Dict[str, Json]
-    #: Units that are not like the others.
-    odd: Set[str]
 
 
 def against_type(
@@ -43,21 +41,19 @@ def against_type(
 ) -> Typed:
     """Compares each unit with all others that are like each other; ``extra`` varies from log to log."""
     numbers = {past.unit: _with(past, extra) for past in units}
-    odd: Set[str] = set()
     if len(units) < LEAST:
-        return Typed({}, {}, odd)
+        return Typed({}, {})
     spread = _spreads(numbers, robust_between)
     tried: List[Set[str]] = []
+    like = units
     while True:
+        comparison = _compared(job, units, like, spread, extra, level, mapped, first=not tried)
+        odd = {unit for unit, said in comparison.items() if said["differ"]}
+        if odd in tried or len(units) - len(odd) < LEAST:
+            return Typed(spread, comparison)
+        tried.append(odd)
         like = [past for past in units if past.unit not in odd]
-        if tried and len(like) >= LEAST:
-            spread = _spreads({past.unit: numbers[past.unit] for past in like}, between)
-        comparison = _compared(job, units, like, spread, extra, level, mapped)
-        now = {unit for unit, said in comparison.items() if said["differ"]}
-        if now in tried or len(units) - len(now) < LEAST:
-            return Typed(spread, comparison, now)
-        tried.append(now)
-        odd = now
+        spread = _spreads({past.unit: numbers[past.unit] for past in like}, between)
 
 
 def _with(past: Past, extra: Mapping[str, Extra]) -> Dict[str, Number]:
@@ -88,16 +84,23 @@ def _compared(
     extra: Mapping[str, Extra],
     level: float,
     mapped: Mapped,
+    first: bool,
 ) -> Dict[str, Json]:
-    """Each unit with all of ``like`` but itself, at its share of the level (Bonferroni over units)."""
+    """Each unit with all of ``like`` but itself, at its share of the level (Bonferroni over units).
+
+    ``first``: with all, itself among them, so that one fit does for every unit. Nothing is concluded of
+    that but who is no part of the type when all are asked again.
+    """
     groups = [like[k : k + FAN_IN] for k in range(0, len(like), FAN_IN)]
     wholes = mapped(_joined, job, [[past.key for past in group] for group in groups])
+    # The one that several units have: made once.
+    mapped(fit_joined, job, [wholes])
     arguments = []
     for past in units:
         others: List[str] = []
         for group, whole in zip(groups, wholes):
             apart = [other.key for other in group if other.unit != past.unit]
-            others += [whole] if len(apart) == len(group) else apart
+            others += [whole] if first or len(apart) == len(group) else apart
         logs = sum(other.count for other in like if other.unit != past.unit)
         count = sum(other.unit != past.unit for other in like)
         type_extra = {
@@ -118,8 +121,8 @@ def _joined(job: Job, keys: List[str]) -> str:
 def _compare_one(job: Job, argument: Any, of_logs: Mapping[str, Extra], level: float) -> Json:
     past, others, type_extra = argument
     fit: Fit = past.fit
-    type_side = fit_joined(job, others).widened(type_extra).side()
-    return compare(type_side, fit.widened(of_mean(of_logs, past.count)).side(), level)
+    type_side = fit_joined(job, others).widened(type_extra).side("type")
+    return compare(type_side, fit.widened(of_mean(of_logs, past.count)).side(past.unit), level)
 
 
 def surest(comparison: Optional[Json]) -> float:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import json
 import os
 import tempfile
 import time
 from dataclasses import dataclass, field
-from typing import Any, Dict, FrozenSet, List, Optional, Sequence
+from typing import Any, Dict, FrozenSet, Optional, Sequence
 
 import fsspec
 
@@ -20,6 +21,9 @@ from . import _files
 from ._fit import Fit
 from ._logs import Found, Rule, date_of, unit_of
 from ._store import SCHEMA, Row, Store
+
+#: Summaries that are in memory together: each has three megabytes at most.
+AT_ONCE = 32
 
 
 @dataclass(frozen=True)
@@ -120,24 +124,43 @@ def joined(job: Job, keys: Sequence[str]) -> str:
     return key
 
 
-def join(job: Job, keys: Sequence[str]) -> Summary:
-    """Some summaries of the store as one, read one by one."""
+def join(job: Job, keys: Sequence[str], whole: Optional[Summary] = None) -> Summary:
+    """Some summaries of the store as one, with ``whole`` where it is given; a few are in memory at once."""
     store = Store(job.store)
-    whole = Summary.from_bytes(_files.read(store.summary(keys[0])))
-    for key in keys[1:]:
-        part = Summary.from_bytes(_files.read(store.summary(key)))
-        whole = summarize(arm_of(job.arm), [whole, part])
+    for k in range(0, len(keys), AT_ONCE):
+        parts = [Summary.from_bytes(_files.read(store.summary(key))) for key in keys[k : k + AT_ONCE]]
+        parts = parts if whole is None else [whole, *parts]
+        whole = parts[0] if len(parts) == 1 else summarize(arm_of(job.arm), parts)
+    assert whole is not None
     return whole
 
 
-def fit_of(job: Job, summary: Summary) -> Fit:
-    """The fit of a summary."""
-    return Fit.of(identify(arm_of(job.arm), summary))
+class Growing:
+    """Summaries of the store that are joined one after the other, and the fits of the first 1, 2, … of them.
+
+    A fit that was made once is in the store; summaries are read only for those that are not.
+    """
+
+    def __init__(self, job: Job, keys: Sequence[str]) -> None:
+        self.job, self.keys = job, list(keys)
+        self.whole: Optional[Summary] = None
+        self.have = 0
+
+    def fit(self, count: int) -> Fit:
+        """The fit of the first ``count``, which grows from call to call."""
+        path = f"{self.job.store}/fits/{_files.key_of(self.job.setup, *self.keys[:count])}.json"
+        if _files.exists(path):
+            return Fit(*json.loads(_files.read(path)))
+        self.whole = join(self.job, self.keys[self.have : count], self.whole)
+        self.have = count
+        fit = Fit.of(identify(arm_of(self.job.arm), self.whole))
+        _files.write(path, json.dumps([fit.identified, fit.covariance]).encode())
+        return fit
 
 
-def fit_joined(job: Job, keys: List[str]) -> Fit:
+def fit_joined(job: Job, keys: Sequence[str]) -> Fit:
     """The fit of some summaries of the store."""
-    return fit_of(job, join(job, keys))
+    return Growing(job, keys).fit(len(keys))
 
 
 def _hash(file: str) -> str:
