@@ -15,14 +15,14 @@ import powerball as pb
 import synthetic_fleet as synthetic
 from conftest import need
 
-if not all(map(pytest.importorskip if "REQUIRE_ALL" not in os.environ else need, ("distributed", "pyarrow"))):
-    raise ImportError("a fleet's packages")
+need("distributed")
+need("pyarrow")
 
-from dask.distributed import Client
+from dask.distributed import Client  # noqa: E402
 
-from powerball import fleet
-from powerball.fleet import _files, _past, _report, _spread, _store
-from powerball.fleet.__main__ import main
+from powerball import fleet  # noqa: E402
+from powerball.fleet import _files, _past, _report, _spread, _store  # noqa: E402
+from powerball.fleet.__main__ import main  # noqa: E402
 
 #: What a row says beyond the content of its log.
 PLACES = ("log", "stamp")
@@ -39,7 +39,7 @@ def small(tmp_path_factory):
 @pytest.fixture(scope="module")
 def client():
     """Two workers that are processes."""
-    with Client(n_workers=2, threads_per_worker=1, dashboard_address=None) as client:
+    with Client(n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0") as client:
         yield client
 
 
@@ -198,7 +198,9 @@ def bucket(request, monkeypatch):
             monkeypatch.setenv(name, value)
     # What was opened before may be set to another server.
     fsspec.get_filesystem_class(request.param).clear_instance_cache()
-    with Client(processes=False, n_workers=2, threads_per_worker=1, dashboard_address=None) as client:
+    with Client(
+        processes=False, n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0"
+    ) as client:
         yield client, f"{request.param}://bucket"
     if server:
         server.stop()
@@ -365,7 +367,7 @@ def test_a_thousand_logs(tmp_path, capsys):
     process.wait()
 
     job = fleet.job(arm_file, str(store))
-    with Client(n_workers=2, threads_per_worker=1, dashboard_address=None) as client:
+    with Client(n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0") as client:
         work = fleet.update(client, job, [str(logs)])
         assert work.known >= 300 and work.known + len(work.outcomes) == 1000
         start = time.perf_counter()

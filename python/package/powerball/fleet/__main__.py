@@ -117,7 +117,7 @@ def _run(given: argparse.Namespace) -> int:
     if given.scheduler:
         client = Client(given.scheduler)
     else:
-        client = Client(n_workers=given.workers, threads_per_worker=1, dashboard_address=None)
+        client = Client(n_workers=given.workers, threads_per_worker=1, dashboard_address="127.0.0.1:0")
     with client:
         work = update(client, one, given.logs, given.retry)
         judged = judge(client, one, given.level, given.quiet_logs)

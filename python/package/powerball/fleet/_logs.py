@@ -101,7 +101,8 @@ def _entry(fs: Any, path: str) -> Found:
     written = (
         when.astimezone(timezone.utc).strftime("%Y-%m-%dT%H:%M:%S") if isinstance(when, datetime) else ""
     )
-    return Found(fs.unstrip_protocol(path), int(info["size"]), stamp or str(fs.ukey(path)), written)
+    log = path if "file" in fs.protocol else fs.unstrip_protocol(path)
+    return Found(log, int(info["size"]), stamp or str(fs.ukey(path)), written)
 
 
 def unit_of(rule: Rule, log: str, file: str) -> str:

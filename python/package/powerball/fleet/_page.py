@@ -75,14 +75,14 @@ def _odd(unit: Json, report: Json, judged: Judged) -> str:
     """What is odd about a unit: sentences, numbers with intervals, and their course over time."""
     parts = [f"<h2>{html.escape(unit['unit'])}</h2>"]
     parts += [paragraph(f"Against {against}: {sentence}") for against, sentence in words(unit)]
-    compared = [("before and after", change["comparison"]) for change in unit["against_past"]]
+    compared = [("before", "after", change["comparison"]) for change in unit["against_past"]]
     if unit["differs"]:
-        compared.insert(0, ("its type and the unit", unit["against_type"]))
+        compared.append(("its type", "this unit", unit["against_type"]))
     shown: Dict[str, None] = {}
-    for what, comparison in compared:
+    for a, b, comparison in compared:
         rows = _differing(comparison)
         if rows:
-            parts.append(table([what, "", "", "difference, interval"], rows))
+            parts.append(table(["number", a, b, "difference (interval)"], rows))
         shown.update(_numbers_of(comparison))
     rows_of_unit = [row for row in judged.rows if row["unit"] == unit["unit"] and row["verdict"] == "usable"]
     spread = {entry["number"]: entry for entry in report["spread"]}

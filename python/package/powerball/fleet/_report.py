@@ -141,7 +141,7 @@ def terminal(report: Json, work: Work, most: int = 20) -> str:
     lines.append(f"{len(odd)} of {count} units are odd; {quiet} are {like}")
     lines.append(in_words(work))
     for log in report["not_used"][:most]:
-        lines.append(f"not used: {log['log']}: {'; '.join(log['reasons'])}")
+        lines.append(f"not used: {log['log']}: {'; '.join(log['reasons'])}".replace("\n", "\n  "))
     if len(report["not_used"]) > most:
         lines.append(f"and {len(report['not_used']) - most} more logs that were not used")
     return "\n".join(lines)
