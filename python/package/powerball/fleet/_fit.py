@@ -7,13 +7,22 @@ import math
 import os
 import tempfile
 from dataclasses import dataclass
-from typing import Any, Dict, List, Mapping, Optional, Tuple
+from typing import Any, Dict, Mapping, Optional, Tuple
+
+import numpy as np
 
 from .. import _core
+from .._arrays import Array
 from ..identification import Identified
 from ._store import Row
 
 Json = Dict[str, Any]
+
+#: Friction is followed as a line between these shares of the rms velocity: two of those that compare takes.
+SLOW, FAST = 0.3, 1.2
+
+#: By joint, from 1: the two velocities, rad/s or m/s.
+Speeds = Mapping[int, Tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -43,29 +52,21 @@ class Fit:
 
     @classmethod
     def of(cls, model: Identified) -> Fit:
-        """The files that `powerball identify` writes of a result."""
-        with tempfile.TemporaryDirectory() as folder:
-            model.save(folder)
-            files: List[Json] = []
-            for name in ("identified.json", "covariance.json"):
-                with open(os.path.join(folder, name), encoding="utf-8") as file:
-                    files.append(json.load(file))
-        return cls(*files)
+        """A result as its files."""
+        return cls(model.to_dict(), json.loads(model._core.covariance()))
 
     @classmethod
     def of_row(cls, row: Row) -> Fit:
         """The fit of a log of the store."""
-        flat, identified = row["covariance"], json.loads(row["identified"])
-        size = len(row["freedom"])
-        triangle = [flat[k * (k + 1) // 2 : (k + 1) * (k + 2) // 2] for k in range(size)]
+        flat, size = row["covariance"], len(row["freedom"])
         covariance = {
             "parameters": row["parameters"],
             "joints": len(row["friction"]),
-            "covariance": triangle,
+            "covariance": [flat[k * (k + 1) // 2 : (k + 1) * (k + 2) // 2] for k in range(size)],
             "freedom": row["freedom"],
             "path": json.loads(row["path"]),
         }
-        return cls(identified, covariance)
+        return cls(json.loads(row["identified"]), covariance)
 
     def columns(self) -> Row:
         """What a row of the store has of it."""
@@ -84,51 +85,57 @@ class Fit:
             "path": json.dumps(self.covariance["path"]),
         }
 
-    def numbers(self) -> Dict[str, Number]:
+    def velocity(self, joint: int) -> Optional[float]:
+        """The rms velocity of a joint in the fitted logs, rad/s or m/s."""
+        path, column = self.covariance["path"][joint - 1], self._first(joint) + 2
+        if column not in path["columns"]:
+            return None
+        at = path["columns"].index(column)
+        return math.sqrt(path["products"][at][at])
+
+    def numbers(self, speeds: Speeds) -> Dict[str, Number]:
         """What is followed over logs and units, as far as the logs determine it.
 
-        The minimal set, and of each joint Coulomb friction γ1 + γ3 and viscous friction γ5.
+        The minimal set; and of each joint the line through its friction at two velocities, of which Coulomb
+        friction is the height at rest, viscous friction the slope. The coefficients of Eq. 16 make up for
+        each other and say nothing one by one.
         """
-        found: Dict[str, Tuple[float, Optional[float]]] = {}
-        for entry in self.identified["parameters"]:
-            found[entry["name"]] = (entry["value"], entry["std"])
-        for joint in self.identified["friction"]:
-            j = joint["joint"]
-            found[coulomb(j)] = (joint["gamma1"] + joint["gamma3"], joint.get("coulomb_std"))
-            found[viscous(j)] = (joint["gamma5"], joint["std"][4])
-        return {name: Number(value, std * std) for name, (value, std) in found.items() if std}
+        found = {
+            entry["name"]: Number(entry["value"], entry["std"] ** 2)
+            for entry in self.identified["parameters"]
+            if entry["std"]
+        }
+        for joint, entry in enumerate(self.identified["friction"], 1):
+            if joint in speeds and any(entry["std"]):
+                gamma = np.array([entry["gamma1"], entry["gamma3"], entry["gamma5"], 0.0, 0.0])
+                own = self._block(joint)
+                for name, row in zip(friction_names(joint), self._line(joint, speeds)):
+                    found[name] = Number(float(row @ gamma), max(0.0, float(row @ own @ row)))
+        return {name: number for name, number in found.items() if number.variance > 0.0}
 
-    def widened(self, extra: Mapping[str, Extra]) -> Fit:
+    def widened(self, extra: Mapping[str, Extra], speeds: Speeds) -> Fit:
         """The same values with larger errors: variances come to those of the numbers of these names."""
         covariance = [list(row) for row in self.covariance["covariance"]]
         freedom = list(self.covariance["freedom"])
-        for name, more in extra.items():
-            for share, column in self._columns_of(name):
-                freedom[column] = _satterthwaite(
-                    (covariance[column][column], freedom[column]),
-                    (share * share * more.variance, more.freedom),
-                )
-            # A Coulomb level is two columns that grow together.
-            for share, a in self._columns_of(name):
-                for other, b in self._columns_of(name):
-                    if a >= b:
-                        covariance[a][b] += share * other * more.variance
+        for k, name in enumerate(self.covariance["parameters"]):
+            if name in extra:
+                freedom[k] = _satterthwaite(Extra(covariance[k][k], freedom[k]), extra[name])
+                covariance[k][k] += extra[name].variance
+        numbers = self.numbers(speeds)
+        for joint, (slow, fast) in speeds.items():
+            first = self._first(joint)
+            for name, change in zip(friction_names(joint), self._changes(joint, slow, fast)):
+                if name not in extra or name not in numbers:
+                    continue
+                # compare takes the least of a joint's.
+                least = min((f for f in freedom[first : first + 5] if f > 0), default=0.0)
+                sure = _satterthwaite(Extra(numbers[name].variance, least), extra[name])
+                for a in range(3):
+                    for b in range(a + 1):
+                        covariance[first + a][first + b] += extra[name].variance * change[a] * change[b]
+                    if change[a] and freedom[first + a] > 0:
+                        freedom[first + a] = min(freedom[first + a], sure)
         return Fit(self.identified, {**self.covariance, "covariance": covariance, "freedom": freedom})
-
-    def _columns_of(self, name: str) -> List[Tuple[float, int]]:
-        """The columns of a number, each with its share of it."""
-        names = self.covariance["parameters"]
-        if name in names:
-            return [(1.0, names.index(name))]
-        for joint in self.identified["friction"]:
-            first = len(names) + 5 * (joint["joint"] - 1)
-            if name == viscous(joint["joint"]):
-                return [(1.0, first + 2)]
-            if name == coulomb(joint["joint"]):
-                whole = joint["gamma1"] + joint["gamma3"]
-                shares = [(joint[f"gamma{k}"] / whole, first + (k - 1) // 2) for k in (1, 3)] if whole else []
-                return [(share, column) for share, column in shares if share]
-        return []
 
     def side(self, name: str) -> Side:
         """As one of two that are compared; ``name`` is what messages call it."""
@@ -137,6 +144,45 @@ class Fit:
                 with open(os.path.join(folder, f"{file}.json"), "w", encoding="utf-8") as opened:
                     json.dump(parsed, opened)
             return Side(name, folder, _core.ComparedSide.read(folder))
+
+    def _first(self, joint: int) -> int:
+        """The first of a joint's five columns: two levels, the slope, two steepnesses."""
+        return len(self.covariance["parameters"]) + 5 * (joint - 1)
+
+    def _block(self, joint: int) -> Array:
+        """The covariance of a joint's friction coefficients, (5, 5)."""
+        first, rows = self._first(joint), self.covariance["covariance"]
+        return np.array(
+            [[rows[first + max(a, b)][first + min(a, b)] for b in range(5)] for a in range(5)], dtype=float
+        )
+
+    def _rows(self, joint: int, velocities: Tuple[float, float]) -> Tuple[Array, Array]:
+        """What a joint's friction coefficients are multiplied with at two velocities."""
+        entry = self.identified["friction"][joint - 1]
+        slow, fast = (np.array(_core.friction_row(entry["gamma2"], entry["gamma4"], v)) for v in velocities)
+        return slow, fast
+
+    def _line(self, joint: int, speeds: Speeds) -> Tuple[Array, Array]:
+        """The same for the height at rest and the slope of the line through both."""
+        (low, high), (slow, fast) = self._rows(joint, speeds[joint]), speeds[joint]
+        slope = (high - low) / (fast - slow)
+        return low - slow * slope, slope
+
+    def _changes(self, joint: int, slow: float, fast: float) -> Tuple[Array, Array]:
+        """What of both levels and the slope makes the line higher by one, and steeper by one.
+
+        The level that saturates first makes it higher, with as much of the slope as it bends by.
+        """
+        low, high = self._rows(joint, (slow, fast))
+        level = int(np.argmax(low[:2]))
+        bends = low[level] * fast - high[level] * slow
+        higher, steeper = np.zeros(3), np.array([0.0, 0.0, 1.0])
+        if bends > 1e-6 * fast:
+            higher[level] = (fast - slow) / bends
+            higher[2] = (low[level] - high[level]) / bends
+        else:
+            higher[level] = 1.0
+        return higher, steeper
 
 
 @dataclass(frozen=True)
@@ -149,6 +195,31 @@ class Side:
     core: _core.ComparedSide
 
 
+@dataclass(frozen=True)
+class Variation:
+    """What varies from log to log of a unit, by number."""
+
+    extra: Mapping[str, Extra]
+    #: The velocities of the friction numbers.
+    speeds: Speeds
+
+    def of_mean(self, count: int) -> Dict[str, Extra]:
+        """The same in a fit of several logs."""
+        return {name: Extra(more.variance / count, more.freedom) for name, more in self.extra.items()}
+
+    def side(self, fit: Fit, count: int, name: str) -> Side:
+        """A fit of some logs of a unit as one of two that are compared."""
+        return fit.widened(self.of_mean(count), self.speeds).side(name)
+
+    def numbers(self, fit: Fit, count: int) -> Dict[str, Number]:
+        """The numbers of a fit of some logs of a unit, with what varies in their variances."""
+        more = self.of_mean(count)
+        return {
+            name: Number(n.value, n.variance + (more[name].variance if name in more else 0.0))
+            for name, n in fit.numbers(self.speeds).items()
+        }
+
+
 def compare(a: Side, b: Side, level: float) -> Json:
     """What ``powerball compare`` says of two fits: comparison.json."""
     text = _core.compare(a.core, b.core, level).json()
@@ -158,14 +229,9 @@ def compare(a: Side, b: Side, level: float) -> Json:
     return parsed
 
 
-def coulomb(joint: int) -> str:
-    """The name of a joint's Coulomb friction."""
-    return f"Coulomb friction of joint {joint}"
-
-
-def viscous(joint: int) -> str:
-    """The name of a joint's viscous friction."""
-    return f"viscous friction of joint {joint}"
+def friction_names(joint: int) -> Tuple[str, str]:
+    """The names of a joint's Coulomb and viscous friction."""
+    return f"Coulomb friction of joint {joint}", f"viscous friction of joint {joint}"
 
 
 def unit_of_number(name: str) -> str:
@@ -173,10 +239,10 @@ def unit_of_number(name: str) -> str:
     return {"C": "N·m", "v": "N·m·s/rad"}.get(name[0], "") if " friction of joint " in name else ""
 
 
-def _satterthwaite(a: Tuple[float, float], b: Tuple[float, float]) -> float:
+def _satterthwaite(own: Extra, more: Extra) -> float:
     """Degrees of freedom of a sum of two variances; 0 where the first one is not determined."""
-    if a[1] <= 0.0:
+    if own.freedom <= 0.0:
         return 0.0
-    doubt = a[0] ** 2 / a[1] + (b[0] ** 2 / b[1] if b[1] > 0 else 0.0)
-    total = (a[0] + b[0]) ** 2
-    return total / doubt if doubt > 0 and math.isfinite(total / doubt) else a[1]
+    doubt = own.variance**2 / own.freedom + (more.variance**2 / more.freedom if more.freedom > 0 else 0.0)
+    freedom = (own.variance + more.variance) ** 2 / doubt if doubt > 0 else own.freedom
+    return freedom if math.isfinite(freedom) else own.freedom

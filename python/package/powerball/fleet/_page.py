@@ -6,7 +6,7 @@ import html
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from .._result import paragraph, table
-from ._fit import Fit, Json, unit_of_number
+from ._fit import Fit, Json, friction_names, unit_of_number
 from ._report import short, words
 from ._run import Judged
 from ._store import Row
@@ -87,7 +87,7 @@ def _odd(unit: Json, report: Json, judged: Judged) -> str:
     rows_of_unit = [row for row in judged.rows if row["unit"] == unit["unit"] and row["verdict"] == "usable"]
     spread = {entry["number"]: entry for entry in report["spread"]}
     for name in list(shown)[:4]:
-        parts.append(_course(name, rows_of_unit, spread.get(name)))
+        parts.append(_course(name, rows_of_unit, spread.get(name), judged))
     return "\n".join(parts)
 
 
@@ -122,14 +122,13 @@ def _numbers_of(comparison: Json) -> Dict[str, None]:
     found = [(entry["p_value"], entry["name"]) for entry in comparison["parameters"] if entry["differs"]]
     for entry in comparison["friction"]:
         if entry["differs"]:
-            for kind in ("Coulomb", "viscous"):
-                found.append((entry["p_value"], f"{kind} friction of joint {entry['joint']}"))
+            found += [(entry["p_value"], name) for name in friction_names(entry["joint"])]
     return {name: None for _, name in sorted(found)}
 
 
-def _course(name: str, rows: Sequence[Row], spread: Optional[Json]) -> str:
+def _course(name: str, rows: Sequence[Row], spread: Optional[Json], judged: Judged) -> str:
     """A number of a unit over its logs, with 95 % intervals, and where units of its type are."""
-    points = [(row["date"], Fit.of_row(row).numbers().get(name)) for row in rows]
+    points = [(row["date"], Fit.of_row(row).numbers(judged.vary.speeds).get(name)) for row in rows]
     known = [(n.value, n.variance**0.5, "odd") for _, n in points if n]
     unit = unit_of_number(name)
     dates = f"{short(rows[0]['date'])} to {short(rows[-1]['date'])}"

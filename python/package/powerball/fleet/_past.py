@@ -15,9 +15,10 @@ grow on average, so the mean number of logs *of the fleet* until any M reaches `
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Dict, List, Mapping, Tuple
+from typing import List, Tuple
 
-from ._fit import Extra, Fit, Json, Side, compare
+from .._errors import RefusedError
+from ._fit import Fit, Json, Side, Variation, compare
 from ._store import Row
 from ._work import Growing, Job, fit_joined, joined
 
@@ -39,16 +40,16 @@ class Past:
     changes: List[Json] = field(default_factory=list)
 
 
-def past_of(job: Job, rows: List[Row], extra: Mapping[str, Extra], level: float, quiet: float) -> Past:
-    """Follows a unit through its usable logs, sorted by date; ``extra`` varies from log to log."""
-    starts, seen, fit = _segments(job, rows, extra, quiet)
+def past_of(job: Job, rows: List[Row], vary: Variation, level: float, quiet: float) -> Past:
+    """Follows a unit through its usable logs, sorted by date."""
+    starts, seen, fit = _segments(job, rows, vary, quiet)
     ends = [*starts[1:], len(rows)]
     parts = [[row["key"] for row in rows[start:end]] for start, end in zip(starts, ends)]
     fits = [fit_joined(job, part) for part in parts[:-1]] + [fit]
     changes = []
     for k in range(1, len(parts)):
         before, after = (
-            _side(fits[i], extra, len(parts[i]), name) for i, name in ((k - 1, "before"), (k, "after"))
+            vary.side(fits[i], len(parts[i]), name) for i, name in ((k - 1, "before"), (k, "after"))
         )
         since, alarm = rows[starts[k]], rows[seen[k - 1]]
         changes.append(
@@ -63,9 +64,7 @@ def past_of(job: Job, rows: List[Row], extra: Mapping[str, Extra], level: float,
     return Past(rows[0]["unit"], joined(job, parts[-1]), len(parts[-1]), fit, changes)
 
 
-def _segments(
-    job: Job, rows: List[Row], extra: Mapping[str, Extra], quiet: float
-) -> Tuple[List[int], List[int], Fit]:
+def _segments(job: Job, rows: List[Row], vary: Variation, quiet: float) -> Tuple[List[int], List[int], Fit]:
     """Where each stretch without a change begins, where each change was seen, the fit of the last stretch."""
     keys = [row["key"] for row in rows]
     starts, seen = [0], []  # type: List[int], List[int]
@@ -76,7 +75,7 @@ def _segments(
             since = k
         count = k - starts[-1]
         evidence = (1.0 + evidence) * bet(
-            _side(past, extra, count, "past"), _side(Fit.of_row(rows[k]), extra, 1, "log")
+            vary.side(past, count, "past"), vary.side(Fit.of_row(rows[k]), 1, "log")
         )
         if evidence >= quiet:
             starts.append(since)
@@ -90,17 +89,13 @@ def bet(past: Side, new: Side) -> float:
     """What a bet of 1 that nothing has changed makes of a log: at most 1 on average while that is true."""
     won = 0.0
     for level in LEVELS:
-        if not compare(past, new, level)["differ"]:
+        try:
+            differ = compare(past, new, level)["differ"]
+        except RefusedError:
+            # They determine nothing that both have: no bet.
+            return 1.0
+        if not differ:
             # What does not differ at one level does not at a stricter one.
             break
         won += 1.0 / level
     return 0.5 + 0.5 * won / len(LEVELS)
-
-
-def _side(fit: Fit, extra: Mapping[str, Extra], count: int, name: str) -> Side:
-    return fit.widened(of_mean(extra, count)).side(name)
-
-
-def of_mean(extra: Mapping[str, Extra], count: int) -> Dict[str, Extra]:
-    """What varies from log to log, in a fit of several."""
-    return {name: Extra(more.variance / count, more.freedom) for name, more in extra.items()}

@@ -66,7 +66,8 @@ def _unit(judged: Judged, past: Past) -> Json:
         "against_type": comparison,
         "against_past": past.changes,
         "numbers": {
-            name: {"value": n.value, "std": n.variance**0.5} for name, n in past.fit.numbers().items()
+            name: {"value": n.value, "std": n.variance**0.5}
+            for name, n in judged.vary.numbers(past.fit, past.count).items()
         },
     }
 
@@ -75,7 +76,7 @@ def _spread(judged: Judged) -> List[Json]:
     """By number: mean over units, and its standard deviation between units and from log to log."""
     found = []
     for name, spread in judged.typed.spread.items():
-        of_logs = judged.of_logs.get(name)
+        of_logs = judged.vary.extra.get(name)
         found.append(
             {
                 "number": name,

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import statistics
 import time
 from dataclasses import dataclass
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import dask.distributed as dd
 
-from ._fit import Extra, Fit
+from ._fit import FAST, SLOW, Extra, Fit, Speeds, Variation
 from ._logs import find
 from ._past import Past, past_of
 from ._spread import within
@@ -43,8 +44,7 @@ class Judged:
     rows: List[Row]
     units: List[Past]
     typed: Typed
-    #: The variance of each number from log to log.
-    of_logs: Dict[str, Extra]
+    vary: Variation
     level: float
     quiet: float
     #: The fit of all usable logs together; its summary's key.
@@ -104,27 +104,40 @@ def judge(client: dd.Client, job: Job, level: float = LEVEL, quiet: float = QUIE
         gathered: List[Any] = client.gather(futures)
         return gathered
 
-    of_logs = _from_log_to_log(by_unit)
-    units: List[Past] = mapped(past_of, job, list(by_unit.values()), extra=of_logs, level=level, quiet=quiet)
-    typed = against_type(job, units, of_logs, level, mapped)
+    vary = _from_log_to_log(by_unit)
+    units: List[Past] = mapped(past_of, job, list(by_unit.values()), vary=vary, level=level, quiet=quiet)
+    typed = against_type(job, units, vary, level, mapped)
     whole_key = _whole(job, [[row["key"] for row in own] for own in by_unit.values()], mapped)
     (whole,) = mapped(fit_joined, job, [[whole_key]])
-    return Judged(rows, units, typed, of_logs, level, quiet, whole, whole_key)
+    return Judged(rows, units, typed, vary, level, quiet, whole, whole_key)
 
 
-def _from_log_to_log(by_unit: Mapping[str, List[Row]]) -> Dict[str, Extra]:
+def _from_log_to_log(by_unit: Mapping[str, List[Row]]) -> Variation:
     """The variance of each number from log to log of a unit."""
+    fits = {unit: [Fit.of_row(row) for row in rows] for unit, rows in by_unit.items()}
+    speeds = _speeds([fit for own in fits.values() for fit in own])
     series: Dict[str, List[Tuple[List[float], List[float]]]] = {}
-    for rows in by_unit.values():
+    for one_unit in fits.values():
         own: Dict[str, Tuple[List[float], List[float]]] = {}
-        for row in rows:
-            for name, number in Fit.of_row(row).numbers().items():
+        for fit in one_unit:
+            for name, number in fit.numbers(speeds).items():
                 values, variances = own.setdefault(name, ([], []))
                 values.append(number.value)
                 variances.append(number.variance)
         for name, one in own.items():
             series.setdefault(name, []).append(one)
-    return {name: Extra(*within(all_units)) for name, all_units in series.items()}
+    return Variation({name: Extra(*within(all_units)) for name, all_units in series.items()}, speeds)
+
+
+def _speeds(fits: Sequence[Fit]) -> Speeds:
+    """Where friction is followed: shares of the median of the logs' rms velocities, by joint."""
+    found = {}
+    for joint in range(1, fits[0].covariance["joints"] + 1):
+        known = [v for v in (fit.velocity(joint) for fit in fits) if v]
+        if known:
+            rms = statistics.median(known)
+            found[joint] = (SLOW * rms, FAST * rms)
+    return found
 
 
 def _whole(job: Job, keys: List[List[str]], mapped: Any) -> str:

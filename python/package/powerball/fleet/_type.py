@@ -11,8 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Set
 
-from ._fit import Extra, Fit, Json, Number, compare
-from ._past import Past, of_mean
+from .._errors import RefusedError
+from ._fit import Extra, Json, Number, Variation, compare
+from ._past import Past
 from ._spread import Spread, between, robust_between
 from ._work import Job, fit_joined, joined
 
@@ -36,33 +37,22 @@ class Typed:
     comparison: Dict[str, Json]
 
 
-def against_type(
-    job: Job, units: Sequence[Past], extra: Mapping[str, Extra], level: float, mapped: Mapped
-) -> Typed:
-    """Compares each unit with all others that are like each other; ``extra`` varies from log to log."""
-    numbers = {past.unit: _with(past, extra) for past in units}
+def against_type(job: Job, units: Sequence[Past], vary: Variation, level: float, mapped: Mapped) -> Typed:
+    """Compares each unit with all others that are like each other."""
+    numbers = {past.unit: vary.numbers(past.fit, past.count) for past in units}
     if len(units) < LEAST:
         return Typed({}, {})
     spread = _spreads(numbers, robust_between)
     tried: List[Set[str]] = []
     like = units
     while True:
-        comparison = _compared(job, units, like, spread, extra, level, mapped, first=not tried)
+        comparison = _compared(job, units, like, spread, vary, level, mapped, first=not tried)
         odd = {unit for unit, said in comparison.items() if said["differ"]}
         if odd in tried or len(units) - len(odd) < LEAST:
             return Typed(spread, comparison)
         tried.append(odd)
         like = [past for past in units if past.unit not in odd]
         spread = _spreads({past.unit: numbers[past.unit] for past in like}, between)
-
-
-def _with(past: Past, extra: Mapping[str, Extra]) -> Dict[str, Number]:
-    """A unit's numbers with what varies from log to log in their variance."""
-    more = of_mean(extra, past.count)
-    return {
-        name: Number(n.value, n.variance + (more[name].variance if name in more else 0.0))
-        for name, n in past.fit.numbers().items()
-    }
 
 
 def _spreads(
@@ -81,7 +71,7 @@ def _compared(
     units: Sequence[Past],
     like: Sequence[Past],
     spread: Mapping[str, Spread],
-    extra: Mapping[str, Extra],
+    vary: Variation,
     level: float,
     mapped: Mapped,
     first: bool,
@@ -106,23 +96,26 @@ def _compared(
         type_extra = {
             name: Extra(s.deviation**2 * (1.0 + 1.0 / count), s.freedom) for name, s in spread.items()
         }
-        for name, more in of_mean(extra, logs).items():
+        for name, more in vary.of_mean(logs).items():
             old = type_extra.get(name)
             type_extra[name] = Extra(more.variance + (old.variance if old else 0.0), (old or more).freedom)
         arguments.append((past, others, type_extra))
-    said = mapped(_compare_one, job, arguments, of_logs=extra, level=level / len(units))
-    return {past.unit: one for past, one in zip(units, said)}
+    said = mapped(_compare_one, job, arguments, vary=vary, level=level / len(units))
+    return {past.unit: one for past, one in zip(units, said) if one}
 
 
 def _joined(job: Job, keys: List[str]) -> str:
     return joined(job, keys)
 
 
-def _compare_one(job: Job, argument: Any, of_logs: Mapping[str, Extra], level: float) -> Json:
+def _compare_one(job: Job, argument: Any, vary: Variation, level: float) -> Optional[Json]:
+    """What compare says of a unit; nothing where its logs determine nothing that the others' do."""
     past, others, type_extra = argument
-    fit: Fit = past.fit
-    type_side = fit_joined(job, others).widened(type_extra).side("type")
-    return compare(type_side, fit.widened(of_mean(of_logs, past.count)).side(past.unit), level)
+    type_side = fit_joined(job, others).widened(type_extra, vary.speeds).side("type")
+    try:
+        return compare(type_side, vary.side(past.fit, past.count, past.unit), level)
+    except RefusedError:
+        return None
 
 
 def surest(comparison: Optional[Json]) -> float:
