@@ -21,7 +21,7 @@ need("pyarrow")
 from dask.distributed import Client  # noqa: E402
 
 from powerball import fleet  # noqa: E402
-from powerball.fleet import _files, _past, _report, _spread, _store  # noqa: E402
+from powerball.fleet import _files, _fit, _past, _report, _spread, _store  # noqa: E402
 from powerball.fleet.__main__ import main  # noqa: E402
 
 #: What a row says beyond the content of its log.
@@ -243,6 +243,44 @@ def test_the_command(small, uninterrupted, tmp_path, capsys):
     # No result at all.
     assert main([str(logs / "unit-00" / "broken.csv"), *options, "--store", str(tmp_path)]) == 3
     assert "missing: q2" in capsys.readouterr().err
+
+
+def test_a_spread_comes_to_the_errors_of_a_fit(small, tmp_path):
+    arm_file, logs = small
+    model = pb.identify(pb.Arm.from_toml(arm_file), logs / "unit-01" / "2026-01-01.csv")
+    fit = _fit.Fit.of(model)
+    # It is what the command writes.
+    model.save(tmp_path)
+    assert fit.covariance == json.loads((tmp_path / "covariance.json").read_text())
+    assert fit.identified == json.loads((tmp_path / "identified.json").read_text())
+    assert _fit.Fit.of_row(fit.columns()) == fit
+
+    speeds = {1: (0.3, 1.2), 2: (0.5, 2.0)}
+    own = fit.numbers(speeds)
+    assert len(own) == 6 + 4
+    for joint, (slow, fast) in speeds.items():
+        # The line goes through Eq. 16.
+        g1, g2, g3, g4, g5 = model.friction[joint - 1].gamma
+        coulomb, viscous = (own[name].value for name in _fit.friction_names(joint))
+        for v in (slow, fast):
+            torque = g1 * np.tanh(g2 * v) + g3 * np.tanh(g4 * v) + g5 * v
+            assert coulomb + viscous * v == pytest.approx(torque, rel=1e-12)
+    # Each variance is larger by what was asked for, and no other one is.
+    for name in own:
+        wide = fit.widened({name: _fit.Extra(0.3, 12.0)}, speeds).numbers(speeds)
+        for other in own:
+            assert wide[other].variance == pytest.approx(
+                own[other].variance + 0.3 * (other == name), rel=1e-6
+            )
+    # compare sees it: what differs by itself does not with the spread.
+    changed = json.loads(json.dumps(fit.identified))
+    for gamma in ("gamma1", "gamma3"):
+        changed["friction"][0][gamma] *= 1.2
+    other = _fit.Fit(changed, fit.covariance).side("b")
+    assert _fit.compare(fit.side("a"), other, 0.01)["differ"]
+    wide = fit.widened({_fit.friction_names(1)[0]: _fit.Extra(0.3, 50.0)}, speeds).side("a")
+    said = _fit.compare(wide, other, 0.01)
+    assert not said["differ"] and (said["a"], said["b"]) == ("a", "b")
 
 
 @pytest.mark.parametrize(

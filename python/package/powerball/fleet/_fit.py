@@ -100,13 +100,15 @@ class Fit:
         friction is the height at rest, viscous friction the slope. The coefficients of Eq. 16 make up for
         each other and say nothing one by one.
         """
+        freedom, covariance = self.covariance["freedom"], self.covariance["covariance"]
         found = {
-            entry["name"]: Number(entry["value"], entry["std"] ** 2)
-            for entry in self.identified["parameters"]
-            if entry["std"]
+            entry["name"]: Number(entry["value"], covariance[k][k])
+            for k, entry in enumerate(self.identified["parameters"])
+            if freedom[k] > 0
         }
         for joint, entry in enumerate(self.identified["friction"], 1):
-            if joint in speeds and any(entry["std"]):
+            first = self._first(joint)
+            if joint in speeds and any(f > 0 for f in freedom[first : first + 5]):
                 gamma = np.array([entry["gamma1"], entry["gamma3"], entry["gamma5"], 0.0, 0.0])
                 own = self._block(joint)
                 for name, row in zip(friction_names(joint), self._line(joint, speeds)):

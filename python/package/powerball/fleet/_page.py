@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import statistics
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from .._result import paragraph, table
@@ -183,7 +184,11 @@ def _class(unit: Json) -> str:
 
 def _dots(points: Sequence[Tuple[float, float, str]], spread: Optional[Json], caption: str) -> str:
     """Values with 95 % intervals next to each other; a band of two deviations where units of the type are."""
-    ends: List[float] = [value + sign * 1.96 * std for value, std, _ in points for sign in (-1, 1)]
+    if not points:
+        return ""
+    # A value that is hardly determined would make the others one line: its bar goes out of the figure.
+    most = 4 * statistics.median([std for _, std, _ in points] or [0.0])
+    ends = [value + sign * 1.96 * min(std, most) for value, std, _ in points for sign in (-1, 1)]
     band = None
     if spread:
         band = [spread["mean"] + sign * 2 * spread["between_units"] for sign in (-1, 1)]
