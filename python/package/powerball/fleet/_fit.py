@@ -14,6 +14,7 @@ import numpy as np
 from .. import _core
 from .._arrays import Array
 from ..identification import Identified
+from ._repair import repaired
 from ._store import Row
 
 Json = Dict[str, Any]
@@ -52,8 +53,14 @@ class Fit:
 
     @classmethod
     def of(cls, model: Identified) -> Fit:
-        """A result as its files."""
-        return cls(model.to_dict(), json.loads(model._core.covariance()))
+        """A result as its files, with a covariance that can be used of every joint."""
+        identified, (covariance, joints) = model.to_dict(), repaired(json.loads(model._core.covariance()))
+        for joint in joints:
+            identified["warnings"].append(
+                f"joint {joint}: both steepnesses of its friction are alike; standard errors of its levels "
+                "say nothing, those of its friction at a velocity were made anew"
+            )
+        return cls(identified, covariance)
 
     @classmethod
     def of_row(cls, row: Row) -> Fit:
@@ -127,11 +134,12 @@ class Fit:
         for joint, (slow, fast) in speeds.items():
             first = self._first(joint)
             for name, change in zip(friction_names(joint), self._changes(joint, slow, fast)):
-                if name not in extra or name not in numbers:
+                if name not in extra:
                     continue
                 # compare takes the least of a joint's.
                 least = min((f for f in freedom[first : first + 5] if f > 0), default=0.0)
-                sure = _satterthwaite(Extra(numbers[name].variance, least), extra[name])
+                own = numbers[name].variance if name in numbers else 0.0
+                sure = _satterthwaite(Extra(own, least), extra[name])
                 for a in range(3):
                     for b in range(a + 1):
                         covariance[first + a][first + b] += extra[name].variance * change[a] * change[b]
