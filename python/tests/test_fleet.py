@@ -284,12 +284,15 @@ def test_a_spread_comes_to_the_errors_of_a_fit(small, tmp_path):
 
 
 def test_a_covariance_without_digits_is_made_anew(small):
-    """Some logs in a thousand have one: both steepnesses of a joint's friction came out alike."""
+    """A log in a hundred has one: both steepnesses of a joint's friction came out alike."""
     arm_file, logs = small
     arm, speeds = pb.Arm.from_toml(arm_file), {1: (0.3, 1.2), 2: (0.3, 1.2)}
-    ratios = []
+    ratios, without = [], 0
     for log in sorted(logs.glob("*/2*.csv")):
         fit = _fit.Fit.of(pb.identify(arm, log))
+        if any("made anew" in warning for warning in fit.identified["warnings"]):
+            without += 1
+            continue
         # One that can be used stays as it is.
         assert _repair.repaired(fit.covariance) == (fit.covariance, [])
         broken = json.loads(json.dumps(fit.covariance))
@@ -302,6 +305,7 @@ def test_a_covariance_without_digits_is_made_anew(small):
         own, anew = (_fit.Fit(fit.identified, c).numbers(speeds) for c in (fit.covariance, made))
         assert set(own) == set(anew) and all(own[n] == anew[n] for n in own if "of joint 1" not in n)
         ratios += [anew[n].variance / own[n].variance for n in _fit.friction_names(1)]
+    assert without <= 2
     assert 0.7 < np.median(ratios) < 1.4 and 0.3 < min(ratios) < max(ratios) < 3.0
 
 

@@ -1,8 +1,8 @@
 """Where the covariance of a fit says nothing of a joint's friction, one that does.
 
 Eq. 16 has two levels with a steepness each. Where both steepnesses come out alike, the levels make up for
-each other: their variances are 1e12 times those of the friction at any velocity, and the inverse of the normal
-equations has lost all digits of the latter (some come out negative). The friction itself is as well known as
+each other: their variances are 1e12 times those of the friction at any velocity, and the inverse of the
+normal equations has lost all digits of the latter (some come out negative). The friction itself is known as
 ever. Its covariance is then made anew of the same columns along the logs, by a pseudo-inverse that leaves out
 what they do not tell, as of white noise, of a size that gives viscous friction the variance that it had.
 On fits without this fault, variances made so are 0.98 of those of `identify` in the median (80 % of them: 0.7
