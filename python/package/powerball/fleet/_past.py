@@ -67,7 +67,8 @@ def past_of(job: Job, rows: List[Row], vary: Variation, level: float, quiet: flo
 def _segments(job: Job, rows: List[Row], vary: Variation, quiet: float) -> Tuple[List[int], List[int], Fit]:
     """Where each stretch without a change begins, where each change was seen, the fit of the last stretch."""
     keys = [row["key"] for row in rows]
-    starts, seen = [0], []  # type: List[int], List[int]
+    starts: List[int] = [0]
+    seen: List[int] = []
     growing, past = Growing(job, keys), Fit.of_row(rows[0])
     since, evidence = 0, 0.0
     for k in range(1, len(rows)):

@@ -73,7 +73,8 @@ class Store:
 
     def compact(self) -> None:
         """Joins the rows of small files. A stop at any moment loses nothing: what was joined goes last."""
-        small, by_key = [], {}  # type: List[str], Dict[str, Row]
+        small: List[str] = []
+        by_key: Dict[str, Row] = {}
         for file in self._tables():
             rows = self._read(file)
             if len(rows) < FULL:
