@@ -39,6 +39,11 @@ impl Identified {
         self.files.first()
     }
 
+    /// covariance.json.
+    fn covariance(&self) -> PyResult<String> {
+        serde_json::to_string(&self.side.uncertainty).map_err(refused)
+    }
+
     /// The files that the command writes.
     fn save(&self, folder: PathBuf) -> PyResult<()> {
         self.files.write(&folder).map_err(input)
@@ -100,6 +105,12 @@ pub(crate) fn identify(
     let additions: Option<&Additions> = known.as_ref().map(|known| &known.model.additions);
     let files = report::identified::files(&identified, additions).map_err(refused)?;
     Ok(Identified { side: Side::of("", &identified), files })
+}
+
+/// What a joint's friction coefficients in covariance.json are multiplied with at a velocity.
+#[pyfunction]
+pub(crate) fn friction_row(gamma2: f64, gamma4: f64, velocity: f64) -> [f64; 5] {
+    powerball::identification::estimate::friction_row([gamma2, gamma4], velocity)
 }
 
 /// Judges a model on logs: verified.json, with what writes its files.

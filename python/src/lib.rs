@@ -27,7 +27,7 @@ mod _core {
     #[pymodule_export]
     use super::explain::{Explained, explain, rule};
     #[pymodule_export]
-    use super::identify::{ComparedSide, Identified, Written, compare, identify, verify};
+    use super::identify::{ComparedSide, Identified, Written, compare, friction_row, identify, verify};
     #[pymodule_export]
     use super::logs::{inspect, read_log};
     #[pymodule_export]

@@ -26,6 +26,7 @@ __all__ = [
     "excite",
     "explain",
     "export_imported",
+    "friction_row",
     "functions",
     "generate",
     "generate_model",
@@ -101,6 +102,7 @@ _Text = Tuple[str, str]
 @final
 class Identified:
     def json(self) -> str: ...
+    def covariance(self) -> str: ...
     def save(self, folder: str) -> None: ...
     def side(self, name: str) -> ComparedSide: ...
 
@@ -152,6 +154,7 @@ def identify(
     estimator: str,
     progress: _Tell,
 ) -> Identified: ...
+def friction_row(gamma2: float, gamma4: float, velocity: float) -> List[float]: ...
 def verify(
     arm: Arm,
     model: _Text,
