@@ -1,18 +1,24 @@
-//! The way back: what was identified, in a copy of the robot description that the arm was imported from.
+//! The way back: what was identified, in a copy of the robot description that the arm was imported from, or in a new one
+//! that has the arm's bodies and joints alone.
 
 mod body;
 mod dcmotor;
 mod edit;
 mod known;
 mod mjcf;
+mod sdf;
 mod share;
 mod term;
+mod tree;
 mod urdf;
+mod usd;
 
 pub use known::{Friction, Known};
 pub use mjcf::mjcf;
+pub use sdf::sdf;
 pub use term::{Law, Term};
 pub use urdf::{Exported, urdf};
+pub use usd::usd;
 
 use crate::Arm;
 use crate::import::{ImportError, Options, Source};

@@ -6,6 +6,7 @@
 //! | [`mod@explain`] | the pipeline that finds effects; its `comparison` **decides that a name is given** |
 //! | [`experiment`] | where names stay open: the path on which they differ most, and what its log decides |
 //! | [`torque_model`] | a model with its effects: its file, its torque along logs, its controller's code |
+//! | [`fmu`] | such a model as an FMU: it moves under torques, in C |
 //! | [`watch`] | whether a model still holds, along a stream: since when not, on which joints and why |
 //!
 //! [`explain()`] is the API, and [`Rule`] holds every threshold.
@@ -31,6 +32,7 @@ mod api;
 pub mod effects;
 pub mod experiment;
 pub mod explain;
+pub mod fmu;
 mod options;
 mod rule;
 pub mod simulate;
