@@ -1,5 +1,5 @@
-/* FMI 3.0, Co-Simulation: torques of the motors in, positions and velocities out. Types and functions are those of the
- * standard (https://fmi-standard.org); what Co-Simulation does not need answers with an error.
+/* FMI 3.0, Co-Simulation: torques of the motors in, positions and velocities out. Types and functions are those
+ * of the standard (https://fmi-standard.org); what Co-Simulation does not need answers with an error.
  */
 
 #include "motion.h"
@@ -16,7 +16,9 @@
 #endif
 
 typedef enum { fmi3OK, fmi3Warning, fmi3Discard, fmi3Error, fmi3Fatal } fmi3Status;
-typedef enum { fmi3Independent, fmi3Constant, fmi3Fixed, fmi3Tunable, fmi3Discrete, fmi3Dependent } fmi3DependencyKind;
+typedef enum {
+    fmi3Independent, fmi3Constant, fmi3Fixed, fmi3Tunable, fmi3Discrete, fmi3Dependent
+} fmi3DependencyKind;
 typedef enum { fmi3IntervalNotYetKnown, fmi3IntervalUnchanged, fmi3IntervalChanged } fmi3IntervalQualifier;
 typedef void *fmi3Instance;
 typedef void *fmi3InstanceEnvironment;
@@ -45,12 +47,15 @@ typedef void (*fmi3LockPreemptionCallback)();
 typedef void (*fmi3UnlockPreemptionCallback)();
 
 /* Value references, as in modelDescription.xml. */
-enum { TIME, MAX_STEP, TORQUES, POSITIONS = TORQUES + JOINTS, VELOCITIES = POSITIONS + JOINTS, END = VELOCITIES + JOINTS };
+enum {
+    TIME, MAX_STEP, TORQUES,
+    POSITIONS = TORQUES + JOINTS, VELOCITIES = POSITIONS + JOINTS, END = VELOCITIES + JOINTS
+};
 
 /* As in modelDescription.xml, s. */
 #define DEFAULT_STEP 2e-4
 
-enum mode { INSTANTIATED, INITIALIZATION, STEP, TERMINATED };
+enum mode { INSTANTIATED, INITIALISATION, STEP, TERMINATED };
 
 /* An arm; behind it is the memory of its terms. */
 struct instance {
@@ -141,7 +146,8 @@ EXPORT fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, f
     fmi3UnlockPreemptionCallback unlockPreemption)
 {
     (void)instanceName, (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn;
-    (void)instanceEnvironment, (void)logMessage, (void)clockUpdate, (void)lockPreemption, (void)unlockPreemption;
+    (void)instanceEnvironment, (void)logMessage, (void)clockUpdate;
+    (void)lockPreemption, (void)unlockPreemption;
     return NULL;
 }
 
@@ -152,16 +158,16 @@ EXPORT fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean
 {
     (void)toleranceDefined, (void)tolerance, (void)stopTimeDefined, (void)stopTime;
     struct instance *me = instance;
-    if (me->mode != INSTANTIATED) return failed(me, "the arm was initialized already");
+    if (me->mode != INSTANTIATED) return failed(me, "the arm was initialised already");
     me->arm.time = startTime;
-    me->mode = INITIALIZATION;
+    me->mode = INITIALISATION;
     return fmi3OK;
 }
 
 EXPORT fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
 {
     struct instance *me = instance;
-    if (me->mode != INITIALIZATION) return failed(me, "the arm is not in its initialization");
+    if (me->mode != INITIALISATION) return failed(me, "the arm is not in its initialisation");
     me->mode = STEP;
     return fmi3OK;
 }
@@ -202,7 +208,7 @@ EXPORT fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference
         const fmi3ValueReference reference = valueReferences[i];
         const bool is_input = reference >= TORQUES && reference < POSITIONS;
         if (reference == TIME || !place(me, reference)) return failed(me, "there is no such variable to set");
-        if (!is_input && me->mode > INITIALIZATION) return failed(me, "only torques are set once the arm moves");
+        if (!is_input && me->mode > INITIALISATION) return failed(me, "only torques change once it moves");
         if (!isfinite(values[i])) return failed(me, "a value is not finite");
         if (reference == MAX_STEP && !(values[i] > 0.0)) return failed(me, "max_step must be above 0");
         *place(me, reference) = values[i];
@@ -219,7 +225,7 @@ EXPORT fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunica
     struct instance *me = instance;
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = false;
     *lastSuccessfulTime = me->arm.time;
-    if (me->mode != STEP) return failed(me, "the arm moves only between initialization and end");
+    if (me->mode != STEP) return failed(me, "the arm moves only between initialisation and end");
     if (!(communicationStepSize > 0.0)) return failed(me, "a step must be longer than 0 s");
     /* A step that is longer by rounding alone is no step more. */
     const double steps = fmax(1.0, ceil(communicationStepSize / me->max_step - 1e-6));
@@ -264,8 +270,11 @@ EXPORT fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState
     {                                                            \
         return failed(instance, #name ": this FMU has no such"); \
     }
-#define NO_MODE(name) \
-    EXPORT fmi3Status name(fmi3Instance instance) { return failed(instance, #name ": this FMU has no such mode"); }
+#define NO_MODE(name)                                                 \
+    EXPORT fmi3Status name(fmi3Instance instance)                     \
+    {                                                                 \
+        return failed(instance, #name ": this FMU has no such mode"); \
+    }
 #define REFERENCES const fmi3ValueReference references[], size_t count
 #define NO_TYPE(type)                                                             \
     NOTHING(fmi3Get##type, REFERENCES, fmi3##type values[], size_t nValues)       \
@@ -288,7 +297,8 @@ NOTHING(fmi3GetClock, REFERENCES, fmi3Clock values[])
 NOTHING(fmi3SetClock, REFERENCES, const fmi3Clock values[])
 NOTHING(fmi3GetNumberOfVariableDependencies, fmi3ValueReference reference, size_t *count)
 NOTHING(fmi3GetVariableDependencies, fmi3ValueReference dependent, size_t elementIndicesOfDependent[],
-        fmi3ValueReference independents[], size_t elementIndicesOfIndependents[], fmi3DependencyKind kinds[], size_t count)
+        fmi3ValueReference independents[], size_t elementIndicesOfIndependents[], fmi3DependencyKind kinds[],
+        size_t count)
 NOTHING(fmi3SerializedFMUStateSize, fmi3FMUState state, size_t *bytes)
 NOTHING(fmi3SerializeFMUState, fmi3FMUState state, fmi3Byte serialized[], size_t bytes)
 NOTHING(fmi3DeserializeFMUState, const fmi3Byte serialized[], size_t bytes, fmi3FMUState *state)
@@ -309,7 +319,8 @@ NOTHING(fmi3SetShiftDecimal, REFERENCES, const fmi3Float64 shifts[])
 NOTHING(fmi3SetShiftFraction, REFERENCES, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
 NOTHING(fmi3UpdateDiscreteStates, fmi3Boolean *needUpdate, fmi3Boolean *terminate, fmi3Boolean *nominals,
         fmi3Boolean *values, fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime)
-NOTHING(fmi3CompletedIntegratorStep, fmi3Boolean noSetFMUState, fmi3Boolean *enterEventMode, fmi3Boolean *terminate)
+NOTHING(fmi3CompletedIntegratorStep, fmi3Boolean noSetFMUState, fmi3Boolean *enterEventMode,
+        fmi3Boolean *terminate)
 NOTHING(fmi3SetTime, fmi3Float64 time)
 NOTHING(fmi3SetContinuousStates, const fmi3Float64 states[], size_t count)
 NOTHING(fmi3GetContinuousStateDerivatives, fmi3Float64 derivatives[], size_t count)

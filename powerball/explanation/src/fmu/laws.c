@@ -42,7 +42,9 @@ bool crosses(struct memory *memory, double q, double gap)
     return memory->has_turned && fabs(q - memory->turned) < gap;
 }
 
-/* The torque of a link that flies through its play, of `reach` times its inertia; a flank stops it within a step. */
+/* The torque of a link that flies through its play, of `reach` times its inertia; a flank stops it within a
+ * step.
+ */
 double fly(struct memory *memory, double load, double reach, double time)
 {
     const double flank = reach * 0.5;

@@ -1,7 +1,8 @@
 //! The arm as it moves, for simulators of systems: an FMU (FMI 3.0, Co-Simulation) with τ in and q, q̇ out.
 //!
-//! Its sources are the rigid arm as dyngen writes it in C, the model's numbers and terms, and three files that are the
-//! same for every model: the motion ([`crate::simulate`] in C), laws with a memory, and the functions of FMI.
+//! Its sources are the rigid arm as dyngen writes it in C, the model's numbers and terms, and three files
+//! that are the same for every model: the motion ([`crate::simulate`] in C), laws with a memory, and the
+//! functions of FMI.
 
 mod description;
 mod terms;

@@ -1,6 +1,6 @@
-/* B(q) ddq + C dq + g + friction + effects = torque, in steps that are linearly implicit in the friction: it is s * dq'
- * against the new velocity dq', with s = f(dq')/dq' found by iteration, so that a joint sticks without chatter. Effects are
- * taken at the old velocity.
+/* B(q) ddq + C dq + g + friction + effects = torque, in steps that are linearly implicit in the friction: it
+ * is s * dq' against the new velocity dq', with s = f(dq')/dq' found by iteration, so that a joint sticks
+ * without chatter. Effects are taken at the old velocity.
  */
 
 #include "motion.h"

@@ -20,7 +20,7 @@ struct instant {
     double running;
 };
 
-/* Of this model (model.c): how many terms there are; Eq. 16 by joint; what the encoders show too much, rad. */
+/* Of this model (model.c): how many terms there are; Eq. 16 by joint; what encoders show too much, rad. */
 extern const unsigned model_terms;
 extern const double model_friction[JOINTS][5];
 extern const double model_encoder_offset[JOINTS];
@@ -40,8 +40,8 @@ struct motion {
     double time;
 };
 
-/* Moves the arm by h seconds under the motors' torques; false where the mass matrix has no inverse or a joint runs away.
- * `memory` has a place for each of the model's terms.
+/* Moves the arm by h seconds under the motors' torques; false where the mass matrix has no inverse or a joint
+ * runs away. `memory` has a place for each of the model's terms.
  */
 bool motion_step(struct motion *arm, struct memory *memory, const double torque[JOINTS], double h);
 

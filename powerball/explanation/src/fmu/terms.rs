@@ -1,4 +1,5 @@
-//! The terms of a model as statements in C: the laws of [`powerball_controller::correction`], which they are tested against.
+//! The terms of a model as statements in C: the laws of [`powerball_controller::correction`], which they are
+//! tested against.
 
 use crate::torque_model::NamedTerm;
 use powerball_controller::correction::Law;
@@ -31,8 +32,8 @@ pub(super) fn effects(text: &mut String, terms: &[NamedTerm]) -> std::fmt::Resul
     writeln!(text, "}}")
 }
 
-/// A law's torque for a coefficient of 1 at a joint; the term's memory is the k-th. `None` where it needs what an FMU has
-/// not: a temperature, or a link that gives way.
+/// A law's torque for a coefficient of 1 at a joint; the term's memory is the k-th. `None` where it needs
+/// what an FMU has not: a temperature, or a link that gives way.
 fn value(law: Law<f64>, j: usize, k: usize) -> Option<String> {
     let side = |steepness: f64| format!("tanh({steepness:?} * dq[{j}])");
     let torque = format!("(rigid[{j}] + friction[{j}])");

@@ -1,4 +1,5 @@
-//! The sources of an FMU compiled and run: its laws against the controller's, its motion against the simulation's.
+//! The sources of an FMU compiled and run: its laws against the controller's, its motion against the
+//! simulation's.
 
 use super::*;
 use crate::simulate::simulate_with;
@@ -13,8 +14,8 @@ use rand::{RngExt, SeedableRng};
 use std::path::PathBuf;
 use std::process::Command;
 
-/// Compiles the sources of an FMU with a program and gives the numbers that it prints; none where there is no compiler,
-/// which `REQUIRE_CC` makes a must.
+/// Compiles the sources of an FMU with a program and gives the numbers that it prints; none where there is no
+/// compiler, which `REQUIRE_CC` makes a must.
 fn run(fmu: &Fmu, main: &str, sources: &[&str], name: &str) -> Option<Vec<f64>> {
     if !Command::new("cc").arg("--version").output().is_ok_and(|o| o.status.success()) {
         assert!(std::env::var_os("REQUIRE_CC").is_none(), "there is no cc");

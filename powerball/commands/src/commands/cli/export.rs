@@ -7,12 +7,8 @@ use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 
-/// Write the load that `explain` or `compare` found in the form of a robot's controller, or the arm that `identify` or
-/// `explain` found in the form of a simulator.
-///
-/// For a controller RESULT is explained.json with a payload on the last link, or comparison.json of two fits of one arm of
-/// which the second one carries a load. For a simulator it is identified.json, model.json, or explained.json next to its
-/// model.json, and --arm is needed. What the form cannot hold is printed.
+/// Write the load that `explain` or `compare` found in the form of a robot's controller, or the arm that
+/// `identify` or `explain` found in the form of a simulator. What the form cannot hold is printed.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  powerball export --for ur out/explained.json -o payload.script\n  \
     powerball export --for sdf --arm arm.toml out/identified.json -o arm.sdf")]
@@ -20,7 +16,9 @@ pub(crate) struct Export {
     /// Whose form.
     #[arg(long = "for", value_enum, value_name = "FORM")]
     form: Target,
-    /// The result.
+    /// The result. For a controller: explained.json with a payload on the last link, or comparison.json of
+    /// two fits of one arm of which the second one carries a load. For a simulator: identified.json,
+    /// model.json, or explained.json next to its model.json.
     #[arg(value_name = "RESULT.json")]
     result: PathBuf,
     /// The arm file (TOML) that the result was identified with: for sdf, usd and fmu.

@@ -48,7 +48,8 @@ impl ArmResult {
         let read = ModelFile::parse(&text, &file).map_err(|e| Failure::Unusable(e.to_string()))?;
         if !read.model.arm.is_empty() && read.model.arm != filed.name {
             return Err(Failure::Unusable(format!(
-                "{}: is a model of the arm '{}', and the arm file is of '{}': take the arm file that it was identified with",
+                "{}: is a model of the arm '{}', and the arm file is of '{}': take the arm file that it was \
+                 identified with",
                 file.display(),
                 read.model.arm,
                 filed.name
@@ -102,31 +103,20 @@ fn model_of(result: &Path) -> Result<(PathBuf, String, Value), Failure> {
         Ok((text, json))
     };
     let (text, json) = read(result)?;
-    if json["parameters"].is_array() && json["friction"].is_array() {
-        return match json.get("differ") {
-            None => Ok((result.to_path_buf(), text, json)),
-            Some(_) => Err(two_arms(result)),
-        };
+    let wrong = |what: &str| format!("{}: {what}", result.display());
+    if json.get("differ").is_some() {
+        let what = "compares two results: give identified.json or model.json of the arm that is meant";
+        return Err(Failure::Refused(wrong(what)));
     }
-    if json["effects"].is_array() {
-        let path = result.with_file_name("model.json");
-        let (text, json) = read(&path)?;
-        return Ok((path, text, json));
+    match ["parameters", "friction", "effects"].map(|key| json[key].is_array()) {
+        [true, true, _] => Ok((result.to_path_buf(), text, json)),
+        [_, _, true] => {
+            let path = result.with_file_name("model.json");
+            let (text, json) = read(&path)?;
+            Ok((path, text, json))
+        }
+        _ => Err(Failure::Unusable(wrong("is neither identified.json, model.json nor explained.json"))),
     }
-    match json.get("differ") {
-        Some(_) => Err(two_arms(result)),
-        None => Err(Failure::Unusable(format!(
-            "{}: is neither identified.json, model.json nor explained.json",
-            result.display()
-        ))),
-    }
-}
-
-fn two_arms(result: &Path) -> Failure {
-    Failure::Refused(format!(
-        "{}: compares two results: give identified.json or model.json of the arm that is meant",
-        result.display()
-    ))
 }
 
 /// A body for each link: those of the result, or of the nearest real arm where it has none.
@@ -142,8 +132,10 @@ fn known(arm: &Arm, model: &TorqueModel, result: &Value, text: &str, file: &Path
     let say = |what: &str| terminal.say(what);
     let nearest =
         nearest_arm(arm, &named, Progress::to(&say)).map_err(|e| Failure::Refused(format!("{name}: {e}")))?;
-    let values =
-        json!({"parameters": result["parameters"], "consistent": {"parameters": nearest.parameters}});
+    // Of an explained model no standard errors are known.
+    let sums = result["parameters"].as_array().into_iter().flatten().filter(|sum| sum["std"].is_number());
+    let sums: Vec<&Value> = sums.collect();
+    let values = json!({"parameters": sums, "consistent": {"parameters": nearest.parameters}});
     read(&values.to_string())
 }
 

@@ -8,8 +8,8 @@ use std::process::Command;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-/// The archive, and what is to be reported about it. The library is of this machine's kind; without a C compiler there is
-/// none, and whoever runs the FMU compiles its sources.
+/// The archive, and what is to be reported about it. The library is of this machine's kind; without a C
+/// compiler there is none, and whoever runs the FMU compiles its sources.
 pub(super) fn packed(fmu: &Fmu) -> Result<(Vec<u8>, Vec<String>), Failure> {
     let failed = |e: &dyn std::fmt::Display| Failure::Refused(format!("the FMU cannot be packed: {e}"));
     let mut notes = Vec::new();
