@@ -1,5 +1,5 @@
-//! The way back: what was identified, in a copy of the robot description that the arm was imported from, or in a new one
-//! that has the arm's bodies and joints alone.
+//! The way back: what was identified, in a copy of the robot description that the arm was imported from, or in
+//! a new one that has the arm's bodies and joints alone.
 
 mod body;
 mod dcmotor;

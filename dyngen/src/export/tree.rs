@@ -1,5 +1,5 @@
-//! An arm as robot descriptions have it that know no table of Denavit and Hartenberg: bodies on joints, each body's frame
-//! on the axis of its joint, with z along the axis.
+//! An arm as robot descriptions have it that know no table of Denavit and Hartenberg: bodies on joints, each
+//! body's frame on the axis of its joint, with z along the axis.
 
 use super::body::{Body, frames, placed};
 use super::known::{Friction, Known};
@@ -114,14 +114,15 @@ fn notes(arm: &Arm, known: &Known, links: &[Link<'_>]) -> Vec<String> {
     let mut notes = Vec::new();
     for link in links.iter().filter(|link| !link.body.is_possible()) {
         notes.push(format!(
-            "link '{}': no body with mass has these values: a physics engine may refuse them (`dyngen check` says why)",
+            "link '{}': no body with mass has these values: a physics engine may refuse them (`dyngen check` \
+             says why)",
             link.link
         ));
     }
     if links.iter().any(|link| link.friction.is_some_and(|f| f.coulomb != 0.0)) {
         notes.push(
-            "friction: the steps of tanh are one step of Coulomb friction of their sum (γ1 + γ3): how it rises near \
-             standstill is left out"
+            "friction: the steps of tanh are one step of Coulomb friction of their sum (γ1 + γ3): how it rises \
+             near standstill is left out"
                 .to_string(),
         );
     }
@@ -132,10 +133,8 @@ fn notes(arm: &Arm, known: &Known, links: &[Link<'_>]) -> Vec<String> {
         ));
     }
     for term in &known.terms {
-        notes.push(format!(
-            "left out: joint '{}': {} of {:.4e} N·m",
-            links[term.link].name, term.effect, term.coefficient
-        ));
+        let (joint, effect) = (&links[term.link].name, &term.effect);
+        notes.push(format!("left out: joint '{joint}': {effect} (coefficient {:.4e})", term.coefficient));
     }
     notes
 }

@@ -8,11 +8,11 @@ use crate::import::pose::Pose;
 use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion, Vector3};
 use std::fmt::Write;
 
-/// An arm with what is known of it as a stage (.usda): an articulation that stands fixed, masses and inertias, limits,
-/// friction and armature.
+/// An arm with what is known of it as a stage (.usda): an articulation that stands fixed, masses and inertias,
+/// limits, friction and armature.
 ///
-/// Angles are in degrees, as UsdPhysics has them, and so is what is by an angle. `by` says in the second line what wrote the
-/// file; `more` are the caller's own notes, which stand in the file too.
+/// Angles are in degrees, as UsdPhysics has them, and so is what is by an angle. `by` says in the second line
+/// what wrote the file; `more` are the caller's own notes, which stand in the file too.
 #[must_use]
 pub fn usd(arm: &Arm, known: &Known, by: &str, more: &[String]) -> Exported {
     let tree = Tree::new(arm, known);
