@@ -1,5 +1,5 @@
 //! What was found goes where it is used: `powerball identify --export` into the URDF that the arm came from,
-//! `powerball export` into the words of a robot's controller.
+//! `powerball export` into the words of a robot's controller, or of a simulator.
 
 #![allow(clippy::unwrap_used)]
 
@@ -171,4 +171,90 @@ fn a_load_is_exported_for_each_controller() {
     assert_eq!((code(&none), folder.join("none.script").exists()), (1, false));
     assert_eq!(code(&export("--for ur missing.json -o none.script")), 2);
     assert_eq!(code(&export("--for abb explained.json -o none.script")), 2);
+}
+
+/// identified.json of the arm of the URDF with its own bodies, where `scale` is 1.
+fn identified(arm: &Arm, values: &[(dyngen::arm::Parameter, f64)], scale: f64) -> serde_json::Value {
+    let model = Model::derive(arm.clone()).unwrap();
+    let mut all = vec![0.0; arm.all_parameters().len()];
+    values.iter().for_each(|(parameter, value)| all[parameter.index()] = *value);
+    let set = model.set(SetKind::Minimal).unwrap();
+    let minimal = set.names().into_iter().zip(model.set_values(set, &all));
+    let minimal: Vec<_> =
+        minimal.map(|(name, value)| serde_json::json!({"name": name, "value": scale * value})).collect();
+    let friction = FRICTION.iter().enumerate().map(|(j, [g1, g2, g3, g4, g5])| {
+        serde_json::json!({"joint": j + 1, "gamma1": g1, "gamma2": g2, "gamma3": g3, "gamma4": g4, "gamma5": g5})
+    });
+    let bodies: serde_json::Map<_, _> =
+        values.iter().map(|(parameter, value)| (parameter.to_string(), (*value).into())).collect();
+    serde_json::json!({"arm": arm.name, "set": "minimal", "parameters": minimal,
+        "friction": friction.collect::<Vec<_>>(), "consistent": {"parameters": bodies}})
+}
+
+/// Each form has the arm's bodies and friction, and lists what it lacks; what is missing or not meant is said.
+#[test]
+fn an_arm_is_exported_for_each_simulator() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("export_arm");
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).unwrap();
+    let import::Imported { arm, values, text, .. } =
+        import::urdf(URDF, "two.urdf", &Options::default()).unwrap();
+    fs::write(folder.join("arm.toml"), &text).unwrap();
+    let mut result = identified(&arm, &values, 1.0);
+    let put = |name: &str, json: &serde_json::Value| fs::write(folder.join(name), json.to_string()).unwrap();
+    put("identified.json", &result);
+    let export = |arguments: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_powerball"));
+        command.current_dir(&folder).arg("export").args(arguments.split_whitespace()).output().unwrap()
+    };
+    let refused = |arguments: &str, code: i32, reason: &str| {
+        let done = export(arguments);
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert!(done.status.code() == Some(code) && said.contains(reason), "{arguments}: {said}");
+    };
+    let notes = |arguments: &str| {
+        let done = export(arguments);
+        assert!(done.status.success(), "{arguments}: {}", String::from_utf8_lossy(&done.stderr));
+        String::from_utf8_lossy(&done.stdout).into_owned()
+    };
+    let read = |name: &str| String::from_utf8_lossy(&fs::read(folder.join(name)).unwrap()).into_owned();
+
+    for (form, masses, friction) in [
+        ("sdf", "<mass>1.0</mass>", "<friction>0.5</friction>"),
+        ("usd", "float physics:mass = 1.0", "dynamicFrictionEffort = 0.5"),
+    ] {
+        // Twice: a file of the command's own is written anew.
+        for _ in 0..2 {
+            notes(&format!("--for {form} --arm arm.toml identified.json -o arm.{form}"));
+        }
+        let text = read(&format!("arm.{form}"));
+        // In USD the base has a mass too.
+        assert!(text.matches(masses).count() >= 2 && text.contains(friction), "{text}");
+    }
+    refused("--for sdf identified.json -o arm.sdf", 2, "--arm ARM.toml");
+    fs::write(folder.join("mine.sdf"), "<sdf/>\n").unwrap();
+    refused("--for sdf --arm arm.toml identified.json -o mine.sdf", 2, "--force");
+    put("comparison.json", &serde_json::json!({"differ": true, "causes": []}));
+    refused("--for sdf --arm arm.toml comparison.json -o other.sdf", 1, "compares two results");
+    put("explained.json", &serde_json::json!({"effects": []}));
+    refused("--for usd --arm arm.toml explained.json -o other.usda", 2, "model.json");
+
+    // With its model next to it; its effects are left out with a note, or are in the FMU.
+    result["consistent"] = serde_json::Value::Null;
+    result["terms"] =
+        serde_json::json!([{"effect": "spring", "joint": 2, "coefficient": 0.5, "law": "position"}]);
+    put("model.json", &result);
+    let said = notes("--for sdf --arm arm.toml explained.json -o explained.sdf");
+    assert!(said.contains("'elbow': spring") && read("explained.sdf").contains("spring"), "{said}");
+    notes("--for fmu --arm arm.toml explained.json -o arm.fmu");
+    let fmu = read("arm.fmu");
+    assert!(fmu.contains("name=\"tau.elbow\"") && fmu.contains("torque[1] += 0.5 * (q[1]);"));
+    assert_eq!(fmu.contains("binaries/"), Command::new("cc").arg("--version").output().is_ok() && cfg!(unix));
+
+    // Less than no mass is none of a real arm: what is nearest is taken, and said to be.
+    let mut impossible = identified(&arm, &values, -1.0);
+    impossible["consistent"] = result["consistent"].clone();
+    put("model.json", &impossible);
+    let said = notes("--for fmu --arm arm.toml model.json -o arm.fmu");
+    assert!(said.contains("no real arm can have the fitted values"), "{said}");
 }

@@ -70,7 +70,7 @@ pub(crate) fn generate_model(
         let model = file.checked(&body).map_err(input)?;
         let source = model.source(&arm, scalar, &names).map_err(|e| match e {
             SourceError::Changes(_) | SourceError::Prefix(_) => input(e),
-            SourceError::Generator(_) => refused(e),
+            SourceError::Generator(_) | SourceError::Coupled => refused(e),
         })?;
         Ok((source, model.not_compensated()))
     })?

@@ -102,7 +102,8 @@ pub(super) fn frames(arm: &Arm) -> (Vec<Pose>, Vec<Pose>) {
     (links, axes)
 }
 
-fn placed(placement: &Option<Placement>) -> Pose {
+/// A placement as a pose; none is where the frame that it is in stands.
+pub(super) fn placed(placement: &Option<Placement>) -> Pose {
     let Some(placement) = placement else { return Pose::identity() };
     let rpy = placement.rpy.each_ref().map(|angle| angle.radians());
     let xyz = placement.xyz.each_ref().map(to_f64);

@@ -5,14 +5,19 @@ mod dcmotor;
 mod edit;
 mod known;
 mod mjcf;
+mod sdf;
 mod share;
 mod term;
+mod tree;
 mod urdf;
+mod usd;
 
 pub use known::{Friction, Known};
 pub use mjcf::mjcf;
+pub use sdf::sdf;
 pub use term::{Law, Term};
 pub use urdf::{Exported, urdf};
+pub use usd::usd;
 
 use crate::Arm;
 use crate::import::{ImportError, Options, Source};

@@ -31,6 +31,7 @@ mod api;
 pub mod effects;
 pub mod experiment;
 pub mod explain;
+pub mod fmu;
 mod options;
 mod rule;
 pub mod simulate;

@@ -15,7 +15,7 @@ mod ros;
 mod rows;
 mod source;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use crate::effects::{PASSES, SOFT, Window, each_instant, move_link, time_delay};
 pub use colour::{Colour, JointColour};

@@ -51,6 +51,9 @@ pub enum SourceError {
     /// No name in C can begin so.
     #[error("{0}")]
     Prefix(String),
+    /// Motors that turn with several joints, for code that knows none.
+    #[error("the arm file couples joints by a transmission, which an FMU does not have here")]
+    Coupled,
 }
 
 impl TorqueModel {

@@ -5,7 +5,7 @@ use dyngen::Arm;
 use powerball_controller::correction::Law;
 use powerball_logs::regression::{Recording, RigidArm};
 
-fn every_law() -> Vec<Law<f64>> {
+pub(crate) fn every_law() -> Vec<Law<f64>> {
     vec![
         Law::Constant,
         Law::VelocityMagnitude,

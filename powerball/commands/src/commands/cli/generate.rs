@@ -77,7 +77,7 @@ impl Generate {
         let failure = |e: SourceError| match e {
             SourceError::Changes(_) => Failure::Unusable(format!("{}: {e}", self.model.display())),
             SourceError::Prefix(_) => Failure::Unusable(format!("--c-header: {e}")),
-            SourceError::Generator(_) => Failure::Refused(e.to_string()),
+            SourceError::Generator(_) | SourceError::Coupled => Failure::Refused(e.to_string()),
         };
         let outputs: Vec<&PathBuf> =
             [&self.output, &self.c_header, &self.yaml].into_iter().flatten().collect();

@@ -8,7 +8,9 @@ mod events;
 mod excite;
 mod explain;
 mod export;
+mod exported_arm;
 mod float;
+mod fmu;
 mod follow;
 mod friction;
 mod generate;
@@ -86,7 +88,7 @@ enum Command {
     Explain(explain::Explain),
     /// Write a model with its effects as one Rust file for a controller.
     Generate(generate::Generate),
-    /// Write a load that was found in the form of a robot's controller.
+    /// Write what was found in another program's form: a load for a robot's controller, the arm for a simulator.
     Export(export::Export),
     /// Report when a model no longer holds, along logs or a stream: since when, on which joints and why.
     Watch(watch::WatchCommand),

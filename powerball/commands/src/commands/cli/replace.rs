@@ -96,6 +96,10 @@ fn is_alike(target: &Path, old: &[u8], new: Option<&[u8]>) -> bool {
     if [Some(old), new].iter().all(|text| text.is_some_and(|text| text.starts_with(b"{\"format\""))) {
         return true;
     }
+    let exported = |bytes: &[u8]| bytes.windows(EXPORTED.len()).any(|part| part == EXPORTED.as_bytes());
+    if exported(old) {
+        return new.is_some_and(exported);
+    }
     let first = |bytes: &[u8]| bytes.split(|b| *b == b'\n').next().map(<[u8]>::to_vec);
     new.is_some_and(|new| first(old) == first(new))
 }
@@ -119,6 +123,13 @@ mod tests {
             ("path.csv", "t,q1\n0,1\n", "t,q1\n0,2\n", true),
             ("path.csv", "t,q1,tau1\n0,1,2\n", "t,q1\n0,2\n", false),
             ("model.rs", "fn main() {}\n", "//! A model.\n", false),
+            (
+                "a.sdf",
+                "<?xml?><!-- written by powerball export, 1 -->",
+                "<?xml?><!-- written by powerball export, 2 -->",
+                true,
+            ),
+            ("a.sdf", "<?xml?>", "<?xml?><!-- written by powerball export, 2 -->", false),
         ] {
             assert_eq!(
                 is_alike(Path::new(name), old.as_bytes(), Some(new.as_bytes())),
