@@ -1,4 +1,5 @@
-//! Export: identified values in a copy of the robot description that the arm was imported from.
+//! Export: identified values in a copy of the robot description that the arm was imported from, or in a new
+//! one that has only the arm's bodies and joints.
 
 mod body;
 mod dcmotor;

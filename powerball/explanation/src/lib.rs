@@ -6,6 +6,7 @@
 //! | [`mod@explain`] | the pipeline that finds effects; its `comparison` **decides that a name is given** |
 //! | [`experiment`] | for open names: the path on which they differ most, and the decision by its log |
 //! | [`torque_model`] | a model with its effects: its file, its torque along logs, its controller's code |
+//! | [`fmu`] | such a model as an FMU: it moves under torques, in C |
 //! | [`watch`] | tests along a stream whether a model still holds: since when not, on which joints and why |
 //!
 //! [`explain()`] is the API, and [`Rule`] holds every threshold.

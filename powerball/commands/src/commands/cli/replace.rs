@@ -9,6 +9,9 @@ use serde_json::Value;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+/// Text in every file that `powerball export` writes for a simulator.
+pub(super) const EXPORTED: &str = "written by powerball export";
+
 /// Whether `--force` was given to this process.
 static FORCE: AtomicBool = AtomicBool::new(false);
 
