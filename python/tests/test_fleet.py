@@ -21,7 +21,7 @@ need("pyarrow")
 from dask.distributed import Client  # noqa: E402
 
 from powerball import fleet  # noqa: E402
-from powerball.fleet import _files, _fit, _past, _repair, _report, _spread, _store  # noqa: E402
+from powerball.fleet import _files, _fit, _past, _report, _spread, _store  # noqa: E402
 from powerball.fleet.__main__ import main  # noqa: E402
 
 #: What a row says beyond the content of its log.
@@ -284,32 +284,6 @@ def test_a_spread_comes_to_the_errors_of_a_fit(small, tmp_path):
     wide = fit.widened({_fit.friction_names(1)[0]: _fit.Extra(0.3, 50.0)}, speeds).side("a")
     said = _fit.compare(wide, other, 0.01)
     assert not said["differ"] and (said["a"], said["b"]) == ("a", "b")
-
-
-def test_a_covariance_without_digits_is_made_anew(small):
-    """A log in a hundred has one: both steepnesses of a joint's friction came out alike."""
-    arm_file, logs = small
-    arm, speeds = pb.Arm.from_toml(arm_file), {1: (0.3, 1.2), 2: (0.3, 1.2)}
-    ratios, without = [], 0
-    for log in sorted(logs.glob("*/2*.csv")):
-        fit = _fit.Fit.of(pb.identify(arm, log))
-        if any("made anew" in warning for warning in fit.identified["warnings"]):
-            without += 1
-            continue
-        # One that can be used stays as it is.
-        assert _repair.repaired(fit.covariance) == (fit.covariance, [])
-        broken = json.loads(json.dumps(fit.covariance))
-        first = len(broken["parameters"])
-        for a in range(2):
-            for b in range(a + 1):
-                broken["covariance"][first + a][first + b] = 1e7 * (-1.0 if a != b else 1.0)
-        made, joints = _repair.repaired(broken)
-        assert joints == [1]
-        own, anew = (_fit.Fit(fit.identified, c).numbers(speeds) for c in (fit.covariance, made))
-        assert set(own) == set(anew) and all(own[n] == anew[n] for n in own if "of joint 1" not in n)
-        ratios += [anew[n].variance / own[n].variance for n in _fit.friction_names(1)]
-    assert without <= 2
-    assert 0.7 < np.median(ratios) < 1.4 and 0.3 < min(ratios) < max(ratios) < 3.0
 
 
 @pytest.mark.parametrize(

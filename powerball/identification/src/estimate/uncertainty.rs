@@ -5,7 +5,7 @@
 
 use super::distribution::{freedom_of, t_quantile_975};
 use super::reduced::Solution;
-use super::solve::NormalEquations;
+use super::solve::{NormalEquations, Solver};
 use super::spectrum::{Power, deconvolved};
 use super::variable_projection::{FRICTION, tangent};
 use faer::Mat;
@@ -152,57 +152,81 @@ struct Group {
     rows: f64,
     /// Residual of the fit, sum of squares.
     left: f64,
-    /// H⁻¹·D.
+    /// L⁻¹·D·L⁻ᵀ, which has the traces of H⁻¹·D.
     turned: Mat<f64>,
-    /// The diagonal of H⁻¹·D·H⁻¹.
-    inverse_square: Vec<f64>,
+}
+
+/// The variance of a coefficient over that which it would have alone; above this, double precision holds no digit of
+/// the friction at a velocity, in which large coefficients cancel each other.
+const INFLATION: f64 = 1e10;
+
+/// The normal equations over the columns that are determined. Where both terms of a joint's friction have nearly one
+/// steepness, its columns depend on each other, and the first term stands for both.
+fn determined(solution: &Solution) -> Solver {
+    let (products, layout) = (solution.products(), solution.layout);
+    let solver = products.solver(|c| solution.free[c]);
+    let inverse = solver.inverse_diagonal();
+    let is_inflated = |c: usize| inverse[c].is_finite() && inverse[c] * products.gram[(c, c)] > INFLATION;
+    let is_one = |j: &usize| (0..FRICTION).any(|which| is_inflated(layout.friction(*j, which)));
+    let second: Vec<usize> =
+        (0..layout.dof).filter(is_one).flat_map(|j| [1, 4].map(|which| layout.friction(j, which))).collect();
+    match second.is_empty() {
+        true => solver,
+        false => products.solver(|c| solution.free[c] && !second.contains(&c)),
+    }
 }
 
 /// The errors of a solution.
+///
+/// With H = L·Lᵀ everything is computed in the coordinates L⁻¹·x, in which columns that nearly depend on each other
+/// lose no digits; H⁻¹ itself is never formed.
 #[must_use]
 pub fn standard_errors(solution: &Solution) -> StandardErrors {
     let size = solution.layout.size();
-    let solver = solution.products().solver(|c| solution.free[c]);
-    let mut inverse = Mat::<f64>::zeros(size, size);
-    for &c in solver.kept() {
-        let mut unit = vec![0.0; size];
-        unit[c] = 1.0;
-        for (r, x) in solver.solve(&unit).into_iter().enumerate() {
-            inverse[(r, c)] = x;
-        }
-    }
+    let solver = determined(solution);
+    let rank = solver.kept().len();
+    let whitened = |columns: &dyn Fn(usize) -> Vec<f64>, count: usize| -> Mat<f64> {
+        let all: Vec<Vec<f64>> = (0..count).map(|c| solver.whitened(&columns(c))).collect();
+        Mat::from_fn(rank, count, |r, c| all[c][r])
+    };
+    // L⁻¹, with a column for each coefficient: 0 where it is not determined.
+    let back = whitened(&|c| (0..size).map(|r| f64::from(u8::from(r == c))).collect(), size);
     let mut groups = Vec::new();
     for (joint, (parts, weight)) in solution.parts.iter().zip(&solution.weights).enumerate() {
         for (octave, part) in parts.iter().enumerate().filter(|(_, p)| p.rows > 0 && *weight > 0.0) {
             let mut products = NormalEquations::zero(size);
             part.add_to(&mut products, 1.0);
-            let turned = &inverse * &products.gram;
-            let inverse_square = (0..size)
-                .map(|i| (0..size).map(|k| turned[(i, k)] * inverse[(k, i)]).sum::<f64>().max(0.0))
-                .collect();
+            let half = whitened(&|c| products.gram.col_as_slice(c).to_vec(), size);
+            let turned = whitened(&|r| (0..size).map(|c| half[(r, c)]).collect(), rank);
             let left = part.left(&solution.theta);
-            let rows = part.rows as f64;
-            groups.push(Group { joint, octave, weight: *weight, rows, left, turned, inverse_square });
+            groups.push(Group { joint, octave, weight: *weight, rows: part.rows as f64, left, turned });
         }
     }
     let powers = without_leaks(&groups, &powers(&groups));
     let (mut std, mut quantile) = (vec![None; size], vec![0.0; size]);
+    let squares: Vec<Vec<f64>> = groups.iter().map(|group| diagonal_within(&group.turned, &back)).collect();
     for &c in solver.kept() {
         let (mut variance, mut doubt) = (0.0, 0.0);
-        for (group, (power, freedom)) in groups.iter().zip(&powers) {
-            let share = group.weight * group.weight * power * group.inverse_square[c];
+        for ((group, square), (power, freedom)) in groups.iter().zip(&squares).zip(&powers) {
+            let share = group.weight * group.weight * power * square[c];
             variance += share;
             doubt += share * share / freedom;
         }
         let freedom = if doubt > 0.0 { variance * variance / doubt } else { f64::from(u16::MAX) };
         (std[c], quantile[c]) = (Some(variance.sqrt()), t_quantile_975(freedom.max(1.0)));
     }
-    let mut covariance = Mat::<f64>::zeros(size, size);
+    let mut sum = Mat::<f64>::zeros(rank, rank);
     for (group, (power, _)) in groups.iter().zip(&powers) {
-        let weight = group.weight * group.weight * power;
-        covariance += faer::Scale(weight) * (&group.turned * &inverse);
+        sum += faer::Scale(group.weight * group.weight * power) * &group.turned;
     }
-    StandardErrors { std, quantile, covariance }
+    StandardErrors { std, quantile, covariance: back.transpose() * (sum * &back) }
+}
+
+/// The diagonal of Xᵀ·A·X, not below 0.
+fn diagonal_within(a: &Mat<f64>, x: &Mat<f64>) -> Vec<f64> {
+    let turned = a * x;
+    let of = |c: usize| (0..x.nrows()).map(|r| x[(r, c)] * turned[(r, c)]).sum::<f64>().max(0.0);
+    (0..x.ncols()).map(of).collect()
 }
 
 /// The powers by group without what leaks between the octaves of a joint; each keeps its degrees of freedom.

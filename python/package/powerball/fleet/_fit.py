@@ -14,7 +14,6 @@ import numpy as np
 from .. import _core
 from .._arrays import Array
 from ..identification import Identified
-from ._repair import repaired
 from ._store import Row
 
 Json = Dict[str, Any]
@@ -53,14 +52,8 @@ class Fit:
 
     @classmethod
     def of(cls, model: Identified) -> Fit:
-        """A result as its files, with a covariance that can be used of every joint."""
-        identified, (covariance, joints) = model.to_dict(), repaired(json.loads(model._core.covariance()))
-        for joint in joints:
-            identified["warnings"].append(
-                f"joint {joint}: both steepnesses of its friction are alike; standard errors of its levels "
-                "say nothing, those of its friction at a velocity were made anew"
-            )
-        return cls(identified, covariance)
+        """A result as its files."""
+        return cls(model.to_dict(), json.loads(model._core.covariance()))
 
     @classmethod
     def of_row(cls, row: Row) -> Fit:
