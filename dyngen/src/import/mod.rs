@@ -216,11 +216,12 @@ fn meant(robot: &urdf::Robot, written: chain::Chain, options: &Options) -> Resul
 
 /// What changes, and by how much at most.
 fn in_words(change: &Change) -> String {
-    let Change { distance, turn, inertia, torque } = *change;
+    let Change { distance, turn, inertia, torque, acceleration } = *change;
     let all = [
         (1e3 * distance, "move the tip by at most", "mm"),
         (1e3 * turn, "turn it by at most", "mrad"),
         (torque, "change the torque that holds the arm still by at most", "N·m"),
+        (acceleration, "change how the arm falls from rest by at most", "rad/s² (m/s²)"),
         (100.0 * inertia, "change M by at most", "% of √(M_ii M_jj)"),
     ];
     let changed = all.into_iter().filter(|(size, ..)| *size > 0.0);

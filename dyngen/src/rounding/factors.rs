@@ -1,9 +1,10 @@
 //! B = LᵀDL and its inverse for every pose within the limits: B is proven positive definite there.
 //!
 //! Over a box of poses with centre c, K = D_c^(−½)·L_c⁻ᵀ makes B_c the identity, so K·B·Kᵀ = 1 + E with a small E. Where
-//! |E| ≤ e < 1 in the spectral norm, B ≥ (1 − e)·B_c > 0. The inverse and the factors of 1 + E are 1 within
-//! N = |E| + |E|² + …, entry by entry, and the products with those of B_c are B⁻¹, L and D of every pose of the box. Boxes
-//! are halved until e is small enough.
+//! the spectral radius of |E| is below 1, B is positive definite, and the inverse and the factors of 1 + E are 1 within
+//! N = |E| + |E|² + …, entry by entry; the products with those of B_c are B⁻¹, L and D of every pose of the box. Boxes are
+//! halved until the radius is small enough. It is at most the largest (|E|·w)ᵢ/wᵢ for any w > 0 (Collatz); a few steps of
+//! the power method give a good w.
 //!
 //! Positive definite matrices of an interval by a congruence: Rump, "Verification methods" (2010), §10; Rohn, "Positive
 //! definiteness and stability of interval matrices" (1994).
@@ -73,13 +74,12 @@ impl MassMatrix {
             if count > boxes || hopeless {
                 return None;
             }
-            let (k, e, widest) = self.deviation(&ranges, &mut gradients)?;
-            if row_norm(&e, self.n) <= most {
-                found.include(&k, &series(&e, self.n, most));
+            let Deviation { k, e, weights, widest } = self.deviation(&ranges, &mut gradients)?;
+            if radius(&e, &weights) <= most {
+                found.include(&k, &series(&e, &weights, most));
                 proven += share;
                 continue;
             }
-            let widest = *self.varied.get(widest)?;
             stack.extend(ranges[widest].halves().map(|half| {
                 let mut ranges = ranges.clone();
                 ranges[widest] = half;
@@ -89,13 +89,8 @@ impl MassMatrix {
         Some(found)
     }
 
-    /// K and the sizes of E over a box, with the place of the variable that adds most to it; `None` where B of the centre
-    /// is not positive.
-    fn deviation(
-        &self,
-        ranges: &[Interval],
-        gradients: &mut [Gradient; 2],
-    ) -> Option<(Vec<f64>, Vec<f64>, usize)> {
+    /// How far B is from that of the centre over a box; `None` where B of the centre is not positive.
+    fn deviation(&self, ranges: &[Interval], gradients: &mut [Gradient; 2]) -> Option<Deviation> {
         let n = self.n;
         let [centre, whole] = gradients;
         let mut at = ranges.to_vec();
@@ -113,31 +108,68 @@ impl MassMatrix {
         };
         let b = of(&|place| centre.values[place]);
         let k = congruence(&b.iter().map(|x| x.middle()).collect::<Vec<_>>(), n)?;
-        let mut total = sizes(&k, &b, n, true);
-        let mut worst = (0.0, 0);
+        let mut e = sizes(&k, &b, n, true);
         let m = self.varied.len();
+        let mut parts = Vec::with_capacity(m);
         for (which, place) in self.varied.iter().enumerate() {
             let slope = of(&|entry| whole.slopes[entry * m + which]);
             let width = 0.5 * ranges[*place].width() * (1.0 + 1e-12);
             let part: Vec<f64> = sizes(&k, &slope, n, false).iter().map(|x| x * width).collect();
-            let norm = row_norm(&part, n);
-            if norm > worst.0 {
-                worst = (norm, which);
-            }
-            total.iter_mut().zip(&part).for_each(|(all, x)| *all += x);
+            e.iter_mut().zip(&part).for_each(|(all, x)| *all += x);
+            parts.push(part);
         }
-        total.iter_mut().for_each(|x| *x *= 1.0 + 1e-12);
-        row_norm(&total, n).is_finite().then_some((k, total, worst.1))
+        e.iter_mut().for_each(|x| *x *= 1.0 + 1e-12);
+        let weights = weights(&e, n);
+        let adds = |part: &[f64]| {
+            let row = |(row, w): (&[f64], &f64)| w * dot(row, &weights);
+            part.chunks(n).zip(&weights).map(row).sum::<f64>()
+        };
+        let adds: Vec<f64> = parts.iter().map(|part| adds(part)).collect();
+        let widest = (0..m).max_by(|a, b| adds[*a].total_cmp(&adds[*b]))?;
+        e.iter().all(|x| x.is_finite()).then_some(Deviation { k, e, weights, widest: self.varied[widest] })
     }
 }
 
-/// The largest sum of a row, which no eigenvalue of a symmetric matrix exceeds.
-fn row_norm(matrix: &[f64], n: usize) -> f64 {
-    matrix.chunks(n).map(|row| row.iter().sum::<f64>()).fold(0.0, f64::max)
+/// B of a box as that of its centre.
+struct Deviation {
+    /// K, upper triangular.
+    k: Vec<f64>,
+    /// At most |E|.
+    e: Vec<f64>,
+    /// Positive weights w for which |E|·w is small.
+    weights: Vec<f64>,
+    /// The variable that adds most to E.
+    widest: usize,
 }
 
-/// N = |E| + |E|² + … for the sizes of E, whose rows sum up to `most` < 1 at most.
-fn series(e: &[f64], n: usize, most: f64) -> Vec<f64> {
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// Nearly the eigenvector of the largest eigenvalue of a symmetric matrix whose entries are not negative.
+fn weights(e: &[f64], n: usize) -> Vec<f64> {
+    let mut weights = vec![1.0; n];
+    for _ in 0..STEPS {
+        let next: Vec<f64> = e.chunks(n).map(|row| dot(row, &weights)).collect();
+        let most = next.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        // Half of the last one, so that no weight is zero and two that alternate settle.
+        weights.iter_mut().zip(&next).for_each(|(w, x)| *w = 0.5 * (*w + x / most));
+    }
+    weights
+}
+
+/// Of the power method.
+const STEPS: usize = 8;
+
+/// At least the spectral radius of a matrix whose entries are not negative.
+fn radius(e: &[f64], weights: &[f64]) -> f64 {
+    let row = |(row, w): (&[f64], &f64)| dot(row, weights) / w * (1.0 + 1e-12);
+    e.chunks(weights.len()).zip(weights).map(row).fold(0.0, f64::max)
+}
+
+/// N = |E| + |E|² + … for a symmetric |E| with |E|·w ≤ `most`·w.
+fn series(e: &[f64], weights: &[f64], most: f64) -> Vec<f64> {
+    let n = weights.len();
     let mut sum = e.to_vec();
     let mut power = e.to_vec();
     for _ in 0..TERMS {
@@ -145,9 +177,13 @@ fn series(e: &[f64], n: usize, most: f64) -> Vec<f64> {
         power = (0..n * n).map(entry).collect();
         sum.iter_mut().zip(&power).for_each(|(all, x)| *all += x);
     }
-    // No entry of what is left out is larger than its row's sum.
+    // |E|ᵐ·w ≤ mostᵐ·w bounds each entry of what is left out, and its mirror.
     let rest = most.powi(TERMS + 2) / (1.0 - most);
-    sum.iter().map(|x| (x + rest) * (1.0 + 1e-12)).collect()
+    let entry = |at: usize| {
+        let (a, b) = (weights[at / n], weights[at % n]);
+        (sum[at] + rest * a.min(b) / a.max(b)) * (1.0 + 1e-12)
+    };
+    (0..n * n).map(entry).collect()
 }
 
 /// Of the series that are summed up in addition to the first.

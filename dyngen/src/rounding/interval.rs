@@ -39,6 +39,12 @@ impl Interval {
         0.5 * self.low + 0.5 * self.high
     }
 
+    /// Whether a number is in it.
+    #[cfg(test)]
+    pub(super) fn contains(self, x: f64) -> bool {
+        self.low <= x && x <= self.high
+    }
+
     /// The lower and the upper half.
     pub(super) fn halves(self) -> [Interval; 2] {
         let middle = self.middle();
