@@ -80,6 +80,7 @@ impl MassMatrix {
                 proven += share;
                 continue;
             }
+            let widest = widest?;
             stack.extend(ranges[widest].halves().map(|half| {
                 let mut ranges = ranges.clone();
                 ranges[widest] = half;
@@ -125,8 +126,8 @@ impl MassMatrix {
             part.chunks(n).zip(&weights).map(row).sum::<f64>()
         };
         let adds: Vec<f64> = parts.iter().map(|part| adds(part)).collect();
-        let widest = (0..m).max_by(|a, b| adds[*a].total_cmp(&adds[*b]))?;
-        e.iter().all(|x| x.is_finite()).then_some(Deviation { k, e, weights, widest: self.varied[widest] })
+        let widest = (0..m).max_by(|a, b| adds[*a].total_cmp(&adds[*b])).map(|which| self.varied[which]);
+        e.iter().all(|x| x.is_finite()).then_some(Deviation { k, e, weights, widest })
     }
 }
 
@@ -138,8 +139,8 @@ struct Deviation {
     e: Vec<f64>,
     /// Positive weights w for which |E|·w is small.
     weights: Vec<f64>,
-    /// The variable that adds most to E.
-    widest: usize,
+    /// The variable that adds most to E; none where B is the same at every pose.
+    widest: Option<usize>,
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
