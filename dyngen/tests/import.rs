@@ -133,7 +133,8 @@ fn rounded_numbers_are_taken_as_meant_and_said() {
         |words: &str| assert!(found.notes.iter().any(|n| n.contains(words)), "{words}: {:#?}", found.notes);
     said("joint 'turn': roll 1.5708 is pi/2, 0.00000003 of its origin is 0, -0.00000004 of its axis is 0");
     // 1.5708 − pi/2 is 3.67e-6 rad; an axis that is off by 4e-8 rad puts half a turn off by twice that.
-    said("mm and 3.75e-3 mrad over the joints' ranges");
+    said("turn it by at most 3.75e-3 mrad, ");
+    said("over the joints' ranges");
     let whole = imported(PUMA, None).unwrap();
     assert!(!whole.notes.iter().any(|n| n.contains("rounded")), "{:?}", whole.notes);
 }

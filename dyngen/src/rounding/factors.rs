@@ -198,7 +198,7 @@ fn congruence(b: &[f64], n: usize) -> Option<Vec<f64>> {
             b[i * n + j] - (i + 1..n).map(|k| lower[k * n + i] * scaled[k * n + j]).sum::<f64>()
         };
         pivots[i] = eliminated(i, &lower, &scaled);
-        if !(pivots[i] > 0.0) {
+        if pivots[i].is_nan() || pivots[i] <= 0.0 {
             return None;
         }
         lower[i * n + i] = 1.0;
