@@ -21,7 +21,7 @@ use std::path::Path;
 pub use transmission::Transmission;
 
 /// The most joints an arm may have.
-pub const MAX_JOINTS: usize = 16;
+pub const MAX_JOINTS: usize = 20;
 
 /// Which Denavit–Hartenberg convention the table follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
