@@ -95,8 +95,20 @@ pub(super) fn read(reader: &mut Reader<'_>, v: &Value<'_>, place: &str) -> Optio
         sound &= value.is_some();
         value.flatten()
     });
-    let [kp, ki, kd, gain, dead_zone, pwm_limit, speed_limit, delay, supply, torque_constant, resistance, armature] =
-        values;
+    let [
+        kp,
+        ki,
+        kd,
+        gain,
+        dead_zone,
+        pwm_limit,
+        speed_limit,
+        delay,
+        supply,
+        torque_constant,
+        resistance,
+        armature,
+    ] = values;
     let servo = Servo {
         kp,
         ki,

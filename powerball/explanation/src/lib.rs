@@ -33,6 +33,7 @@ pub mod experiment;
 pub mod explain;
 mod options;
 mod rule;
+pub mod servo;
 pub mod simulate;
 pub mod torque_model;
 pub mod watch;

@@ -71,7 +71,7 @@ pub(crate) fn doubts<'l>(arm: &Arm, logs: impl IntoIterator<Item = &'l Log>) -> 
 }
 
 /// As [`doubts`], of logs of position servos.
-pub(crate) fn servo_doubts<'l>(arm: &Arm, logs: impl IntoIterator<Item = &'l ServoLog>) -> Vec<String> {
+pub fn servo_doubts<'l>(arm: &Arm, logs: impl IntoIterator<Item = &'l ServoLog>) -> Vec<String> {
     each_once(arm, logs.into_iter().flat_map(|log| &log.doubts))
 }
 

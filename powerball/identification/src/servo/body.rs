@@ -101,13 +101,16 @@ fn motion(log: &ServoLog, piece: &Range<usize>) -> [Vec<Vec<f64>>; 3] {
     let t = &log.t[piece.clone()];
     let of_joint = |q: &Vec<f64>| -> [Vec<f64>; 3] {
         let q = &q[piece.clone()];
-        let Some((start, step, count)) = even_grid(t) else { return [q.to_vec(), vec![0.0; t.len()], vec![0.0; t.len()]] };
+        let Some((start, step, count)) = even_grid(t) else {
+            return [q.to_vec(), vec![0.0; t.len()], vec![0.0; t.len()]];
+        };
         let even = cubic(t, q, start, step, count);
         let smooth = match Butterworth::low_pass(4, BAND.min(OF_RATE / step), 1.0 / step) {
             Some(filter) => filter.zero_phase(&even),
             None => even,
         };
-        let at_samples = |x: &[f64]| t.iter().map(|t| x[(((t - start) / step).round() as usize).min(count - 1)]).collect();
+        let at_samples =
+            |x: &[f64]| t.iter().map(|t| x[(((t - start) / step).round() as usize).min(count - 1)]).collect();
         [q.to_vec(), at_samples(&derivative(&smooth, step)), at_samples(&second_derivative(&smooth, step))]
     };
     let by_joint: Vec<[Vec<f64>; 3]> = log.q.iter().map(of_joint).collect();
@@ -116,7 +119,8 @@ fn motion(log: &ServoLog, piece: &Range<usize>) -> [Vec<Vec<f64>>; 3] {
 
 fn body(arm: &RigidArm, joint: usize, q: &[Vec<f64>], v: &[Vec<f64>], a: &[Vec<f64>]) -> Body {
     let (n, p, samples) = (arm.dof(), arm.names().len(), q[0].len());
-    let states = |x: &[Vec<f64>]| -> Vec<f64> { (0..samples).flat_map(|k| x.iter().map(move |x| x[k])).collect() };
+    let states =
+        |x: &[Vec<f64>]| -> Vec<f64> { (0..samples).flat_map(|k| x.iter().map(move |x| x[k])).collect() };
     let (mut q, v, mut a) = (states(q), states(v), states(a));
     let set = |x: &mut Vec<f64>, value: f64| x.chunks_mut(n).for_each(|state| state[joint] = value);
     let row = |rows: &[f64], k: usize, c: usize| rows[(k * n + joint) * p + c];

@@ -42,8 +42,8 @@ pub enum Constant {
 }
 
 use Constant::{
-    Armature, BackEmf, Coulomb, DeadZone, Delay, Gain, Kd, Ki, Kp, Load, PwmLimit, SpeedLimit, Stribeck, StribeckVelocity,
-    Torque, Viscous, Zero,
+    Armature, BackEmf, Coulomb, DeadZone, Delay, Gain, Kd, Ki, Kp, Load, PwmLimit, SpeedLimit, Stribeck,
+    StribeckVelocity, Torque, Viscous, Zero,
 };
 
 /// How many there are.

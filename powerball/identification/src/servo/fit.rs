@@ -127,11 +127,7 @@ pub fn slopes(of: &impl Errors, values: &[f64], free: &[Free]) -> Vec<Vec<Vec<f6
 
 /// JᵀWJ and JᵀWr.
 #[must_use]
-pub fn normal_equations(
-    slopes: &[Vec<Vec<f64>>],
-    errors: &[Vec<f64>],
-    size: usize,
-) -> (Mat<f64>, Mat<f64>) {
+pub fn normal_equations(slopes: &[Vec<Vec<f64>>], errors: &[Vec<f64>], size: usize) -> (Mat<f64>, Mat<f64>) {
     let (mut normal, mut right) = (Mat::zeros(size, size), Mat::zeros(size, 1));
     for (k, errors) in errors.iter().enumerate() {
         let weights: Vec<f64> = errors.iter().map(|r| weight(*r)).collect();
@@ -140,7 +136,8 @@ pub fn normal_equations(
             right[(i, 0)] += own.iter().zip(errors).zip(&weights).map(|((s, r), w)| w * s * r).sum::<f64>();
             for j in 0..=i {
                 let other = &slopes[j][k];
-                normal[(i, j)] += own.iter().zip(other).zip(&weights).map(|((a, b), w)| w * a * b).sum::<f64>();
+                normal[(i, j)] +=
+                    own.iter().zip(other).zip(&weights).map(|((a, b), w)| w * a * b).sum::<f64>();
                 normal[(j, i)] = normal[(i, j)];
             }
         }

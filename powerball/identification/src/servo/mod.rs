@@ -42,6 +42,8 @@ pub struct ServoArm {
     pub values: Option<Vec<f64>>,
     /// What a mass of 1 kg at the end of the arm adds to them.
     pub payload: Vec<f64>,
+    /// Where the end of the arm is in its last frame: the tool, else the frame itself, m.
+    pub tool: [f64; 3],
 }
 
 impl ServoArm {
@@ -67,7 +69,7 @@ impl ServoArm {
         let of_set = |values: &Values| values.of_set(body.model(), set);
         let values = values.map(of_set).transpose().map_err(|e| IdentifyError::Known(e.to_string()))?;
         let payload = body.model().set_values(set, &point_mass(arm));
-        Ok(ServoArm { body, values, payload })
+        Ok(ServoArm { body, values, payload, tool: tool(arm) })
     }
 
     /// What is known of a joint.
@@ -78,13 +80,15 @@ impl ServoArm {
     }
 }
 
+fn tool(arm: &Arm) -> [f64; 3] {
+    arm.tool.as_ref().map_or([0.0; 3], |tool| tool.xyz.each_ref().map(dyngen::exact::rational::to_f64))
+}
+
 /// All parameters of 1 kg where the arm's last frame or its tool is.
 fn point_mass(arm: &Arm) -> Vec<f64> {
-    use dyngen::exact::rational::to_f64;
-    let at = arm.tool.as_ref().map_or([0.0; 3], |tool| tool.xyz.each_ref().map(to_f64));
     let mut all = vec![0.0; arm.all_parameters().len()];
     let per_link = all.len() / arm.links().max(1);
-    let [x, y, z] = at;
+    let [x, y, z] = tool(arm);
     let own = [1.0, x, y, z, y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y];
     let link = arm.tool_carrier() * per_link;
     all[link..link + own.len()].copy_from_slice(&own);
@@ -138,7 +142,8 @@ impl<'l> Joint<'l> {
     }
 
     /// The delay with which the goal is nearest to the position, s.
-    fn goal_delay(&self) -> f64 {
+    #[must_use]
+    pub fn goal_delay(&self) -> f64 {
         let [most, step] = DELAYS;
         let delays = (0..=(most / step) as usize).map(|k| k as f64 * step);
         let error = |delay: &f64| rms(&self.problem.goal_errors(*delay));
@@ -148,7 +153,8 @@ impl<'l> Joint<'l> {
 
 fn too_short() -> IdentifyError {
     IdentifyError::NothingUsable(vec![
-        "no log has half a second of samples without a gap: record longer, or see `powerball log`".to_string(),
+        "no log has half a second of samples without a gap: record longer, or see `powerball log`"
+            .to_string(),
     ])
 }
 
@@ -184,7 +190,9 @@ pub fn identify_servos(
         along: Vec::new(),
     };
     if validate.is_empty() {
-        result.warnings.push("no log was given to --validate: the errors below are those of the fit itself".into());
+        result
+            .warnings
+            .push("no log was given to --validate: the errors below are those of the fit itself".into());
     }
     for j in 0..dof {
         progress.say(&format!("fitting the servo of joint {}", j + 1));
@@ -197,7 +205,8 @@ pub fn identify_servos(
             add(stats, &left, &held_out.goal_errors(delay));
         }
         report(&mut result, arm, &joint, j);
-        let (shown, left) = if validate.is_empty() { (&joint.problem, &joint.fitted.errors) } else { (&held_out, &left) };
+        let (shown, left) =
+            if validate.is_empty() { (&joint.problem, &joint.fitted.errors) } else { (&held_out, &left) };
         result.along.push(along(shown, left));
     }
     let judged = result.validate.as_ref().unwrap_or(&result.fit);
@@ -244,7 +253,8 @@ fn report(result: &mut IdentifiedServos, arm: &ServoArm, joint: &Joint<'_>, j: u
     for (at, role) in joint.problem.roles.iter().enumerate() {
         if let Role::Inertial(c) = role {
             let own = &arm.body.names()[*c];
-            let name = if arm.body.dof() == 1 { own.clone() } else { format!("{own} (joint {number} alone)") };
+            let name =
+                if arm.body.dof() == 1 { own.clone() } else { format!("{own} (joint {number} alone)") };
             let unit = if absolute { "SI" } else { "SI, for each N·m of torque at full duty" }.to_string();
             let (value, std) = (joint.fitted.values[at], joint.std[at]);
             result.parameters.push(Found { name, value, std, unit, known: false });

@@ -33,8 +33,10 @@ pub enum Role {
 }
 
 /// A joint in logs, with what is known of it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Problem<'l> {
+    /// The joint, from 0.
+    pub joint: usize,
     tracks: Vec<Track<'l>>,
     bodies: Vec<Body>,
     /// The log of each track.
@@ -72,7 +74,8 @@ impl Known<'_> {
 fn tracks<'l>(arm: &RigidArm, logs: &'l [ServoLog], joint: usize) -> (Vec<Track<'l>>, Vec<Body>, Vec<usize>) {
     let (mut tracks, mut all, mut of) = (Vec::new(), Vec::new(), Vec::new());
     for (k, log) in logs.iter().enumerate() {
-        let long = |p: &&Range<usize>| p.len() >= SHORTEST.1 && log.t[p.end - 1] - log.t[p.start] >= SHORTEST.0;
+        let long =
+            |p: &&Range<usize>| p.len() >= SHORTEST.1 && log.t[p.end - 1] - log.t[p.start] >= SHORTEST.0;
         let pieces: Vec<Range<usize>> = log.pieces.iter().filter(long).cloned().collect();
         all.extend(bodies(arm, log, joint, &pieces));
         for own in pieces {
@@ -96,7 +99,8 @@ impl<'l> Problem<'l> {
         let constants = given(&known.servo);
         let inertial = known.values.map_or(vec![0.0; arm.names().len()], <[f64]>::to_vec);
         let payload = known.payload.to_vec();
-        let mut problem = Problem { tracks, bodies, log, constants, inertial, payload, roles: Vec::new() };
+        let mut problem =
+            Problem { joint, tracks, bodies, log, constants, inertial, payload, roles: Vec::new() };
         problem.roles = problem.free(known);
         Some(problem)
     }
@@ -106,7 +110,16 @@ impl<'l> Problem<'l> {
     pub fn in_logs<'o>(&self, arm: &RigidArm, logs: &'o [ServoLog], joint: usize) -> Problem<'o> {
         let (tracks, bodies, log) = tracks(arm, logs, joint);
         let (inertial, payload) = (self.inertial.clone(), self.payload.clone());
-        Problem { tracks, bodies, log, constants: self.constants, inertial, payload, roles: Vec::new() }
+        Problem {
+            joint,
+            tracks,
+            bodies,
+            log,
+            constants: self.constants,
+            inertial,
+            payload,
+            roles: Vec::new(),
+        }
     }
 
     /// The part of it that is one log.
@@ -117,11 +130,35 @@ impl<'l> Problem<'l> {
             tracks: own.iter().map(|k| self.tracks[*k]).collect(),
             bodies: own.iter().map(|k| self.bodies[*k].clone()).collect(),
             log: vec![log; own.len()],
-            constants: self.constants,
-            inertial: self.inertial.clone(),
-            payload: self.payload.clone(),
-            roles: self.roles.clone(),
+            ..self.clone()
         }
+    }
+
+    /// It, with the tracks of others in addition.
+    #[must_use]
+    pub fn and<'o>(mut self, others: impl IntoIterator<Item = &'o Problem<'l>>) -> Problem<'l>
+    where
+        'l: 'o,
+    {
+        for other in others {
+            self.tracks.extend_from_slice(&other.tracks);
+            self.bodies.extend_from_slice(&other.bodies);
+            self.log.extend_from_slice(&other.log);
+        }
+        self
+    }
+
+    /// It, with other things to fit.
+    #[must_use]
+    pub fn asking(&self, roles: Vec<Role>) -> Problem<'l> {
+        Problem { roles, ..self.clone() }
+    }
+
+    /// The most torque that 1 kg at the end of the arm takes of this joint at rest, N·m.
+    #[must_use]
+    pub fn payload_torque(&self) -> f64 {
+        let largest = |m: &Moved| m.harmonics.iter().skip(1).fold(0.0f64, |a, x| a.max(x.abs()));
+        self.bodies.iter().flat_map(|body| body.with(&self.payload)).map(|m| largest(&m)).fold(0.0, f64::max)
     }
 
     /// What is fitted: what is neither known nor hidden behind something else.
@@ -247,7 +284,10 @@ impl<'l> Problem<'l> {
             let values: Vec<f64> = (0..self.inertial.len()).map(|k| f64::from(k == c)).collect();
             let moved = self.bodies.first().map(|body| body.with(&values)).unwrap_or_default();
             let rest = |m: &Moved| m.harmonics.iter().fold(0.0f64, |a, x| a.max(x.abs()));
-            (moved.iter().fold(0.0, |a, m| a + m.inertia / moved.len() as f64), moved.iter().map(rest).fold(0.0, f64::max))
+            (
+                moved.iter().fold(0.0, |a, m| a + m.inertia / moved.len() as f64),
+                moved.iter().map(rest).fold(0.0, f64::max),
+            )
         };
         let units: Vec<(f64, f64)> = (0..self.inertial.len()).map(unit).collect();
         let free = |c: &usize| self.roles.contains(&Role::Inertial(*c));
@@ -306,6 +346,13 @@ impl<'l> Problem<'l> {
     pub fn block(&self) -> usize {
         let step = self.tracks.first().and_then(|track| median_step(track.t)).unwrap_or(BLOCK);
         (BLOCK / step).ceil() as usize
+    }
+
+    /// How many blocks of its samples count as independent.
+    #[must_use]
+    pub fn blocks(&self) -> usize {
+        let block = self.block();
+        self.tracks.iter().map(|track| track.t.len().div_ceil(block)).sum()
     }
 
     /// Errors of the goal that comes later by `delay`, by track, rad: what anybody knows without a model.

@@ -34,7 +34,8 @@ pub fn standard_errors(
     for (k, errors) in errors.iter().enumerate() {
         for from in (0..errors.len()).step_by(block.max(1)) {
             let own = from..(from + block.max(1)).min(errors.len());
-            let part: Vec<Vec<Vec<f64>>> = slopes.iter().map(|by| vec![by[k][own.clone()].to_vec()]).collect();
+            let part: Vec<Vec<Vec<f64>>> =
+                slopes.iter().map(|by| vec![by[k][own.clone()].to_vec()]).collect();
             let (_, g) = normal_equations(&part, &[errors[own].to_vec()], size);
             scatter += &g * g.transpose();
             blocks += 1;

@@ -332,7 +332,8 @@ impl Columns {
     }
 
     fn groups(&self) -> impl Iterator<Item = &Group> {
-        let optional = [&self.temperature, &self.dq, &self.motor].into_iter().chain(&self.of_servos).flatten();
+        let optional =
+            [&self.temperature, &self.dq, &self.motor].into_iter().chain(&self.of_servos).flatten();
         [&self.t, &self.q, &self.torque].into_iter().chain(optional)
     }
 
@@ -393,7 +394,8 @@ impl Columns {
 }
 
 /// What to do with set-points where torques are needed.
-const GOALS_ALONE: &str = "; set-points (goal1 …) are there: `identify` and `explain` take such joints for position servos";
+const GOALS_ALONE: &str =
+    "; set-points (goal1 …) are there: `identify` and `explain` take such joints for position servos";
 
 fn missing_goals(missing: &[String], n: usize) -> String {
     format!(

@@ -231,7 +231,8 @@ impl Raw {
     /// How many signals there are.
     fn signals(&self) -> usize {
         let of_servos = self.of_servos.iter().flatten();
-        let optional = self.temperature.iter().chain(&self.motor).chain(of_servos).map(Vec::len).sum::<usize>();
+        let optional =
+            self.temperature.iter().chain(&self.motor).chain(of_servos).map(Vec::len).sum::<usize>();
         1 + self.q.len() + self.effort.len() + self.dq.len() + optional
     }
 

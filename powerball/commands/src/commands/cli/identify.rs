@@ -156,7 +156,7 @@ impl Identify {
         let asked = servos::Asked {
             arm: (arm, &self.arm),
             masses: &self.masses,
-            logs,
+            logs: (&logs.log, &logs.validate),
             out: &self.out,
             json: self.json,
             accept: self.accept,

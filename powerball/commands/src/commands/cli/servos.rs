@@ -1,10 +1,11 @@
 //! Logs of position servos, which hold set-points and no torques: as `identify` and `explain` take them.
 
-use super::inputs::MountedLogs;
-use super::output::{self, Accept, Verbosity};
 use super::Failure;
+use super::output::{self, Accept, Verbosity};
 use crate::report;
 use dyngen::{Arm, Values};
+use powerball_explanation::Rule;
+use powerball_explanation::servo::{ExplainedServos, explain_servos};
 use powerball_identification::servo::{IdentifiedServos, ServoArm, identify_servos};
 use powerball_identification::{Input, Source};
 use powerball_logs as logs;
@@ -89,18 +90,22 @@ impl ServoLogs {
 pub(super) struct Asked<'a> {
     pub arm: (&'a Arm, &'a Path),
     pub masses: &'a Masses,
-    pub logs: &'a MountedLogs,
+    pub logs: (&'a [Source<'a>], &'a [Source<'a>]),
     pub out: &'a Path,
     pub json: bool,
     pub accept: Accept,
 }
 
 /// `powerball identify` on logs of position servos.
-pub(super) fn identify(asked: &Asked<'_>, terminal: &output::Progress, verbosity: Verbosity) -> Result<(), Failure> {
+pub(super) fn identify(
+    asked: &Asked<'_>,
+    terminal: &output::Progress,
+    verbosity: Verbosity,
+) -> Result<(), Failure> {
     let say = |what: &str| terminal.say(what);
     let arm = asked.masses.arm(asked.arm.0, asked.arm.1)?;
     terminal.say("reading logs");
-    let read = ServoLogs::read(&asked.logs.log, &asked.logs.validate, asked.arm.0)?;
+    let read = ServoLogs::read(asked.logs.0, asked.logs.1, asked.arm.0)?;
     let mut found = identify_servos(&arm, &read.fit, &read.validate, logs::Progress::to(&say))?;
     found.warnings.splice(0..0, read.warnings);
     let files = report::servos::files(&found).map_err(Failure::Refused)?;
@@ -122,11 +127,69 @@ fn in_words(found: &IdentifiedServos, verbose: bool, out: &Path) -> String {
     lines.push("joint  position error (simulated closed loop), rad".to_string());
     for (j, servo) in found.servo.iter().enumerate() {
         let held_out = found.validate.as_ref().map_or(String::new(), |v| {
-            format!(", held out {:.4} (its goal, late by the best delay: {:.4})", v.position_error[j], v.goal_error[j])
+            format!(
+                ", held out {:.4} (its goal, late by the best delay: {:.4})",
+                v.position_error[j], v.goal_error[j]
+            )
         });
-        lines.push(format!("{:>5}  fit {:.4}{held_out}", servo.joint.to_string(), found.fit.position_error[j]));
-        let fitted: Vec<String> = servo.parameters.iter().filter(|p| !p.known).map(report::servos::in_words).collect();
+        lines.push(format!(
+            "{:>5}  fit {:.4}{held_out}",
+            servo.joint.to_string(),
+            found.fit.position_error[j]
+        ));
+        let fitted: Vec<String> =
+            servo.parameters.iter().filter(|p| !p.known).map(report::servos::in_words).collect();
         lines.push(format!("       {}", fitted.join(", ")));
+    }
+    lines.extend(output::notes(found.warnings.len()).filter(|_| !verbose));
+    lines.push(format!("report: {}", out.join("report.html").display()));
+    lines.join("\n")
+}
+
+/// `powerball explain` on logs of position servos.
+pub(super) fn explain(
+    asked: &Asked<'_>,
+    terminal: &output::Progress,
+    verbosity: Verbosity,
+) -> Result<(), Failure> {
+    let say = |what: &str| terminal.say(what);
+    let arm = asked.masses.arm(asked.arm.0, asked.arm.1)?;
+    terminal.say("reading logs");
+    let read = ServoLogs::read(asked.logs.0, asked.logs.1, asked.arm.0)?;
+    let progress = logs::Progress::to(&say);
+    let mut found = explain_servos(&arm, &read.fit, &read.validate, &Rule::default(), progress)?;
+    found.warnings.splice(0..0, read.warnings);
+    let files = report::servos::explained(&found).map_err(Failure::Refused)?;
+    output::write_all(&files, asked.out)?;
+    if asked.json {
+        output::print(&files.first());
+    } else if !verbosity.quiet {
+        output::print(&explained_in_words(&found, verbosity.verbose, asked.out));
+    }
+    asked.accept.judge(&found.unusable)
+}
+
+/// What was found, for a person.
+fn explained_in_words(found: &ExplainedServos, verbose: bool, out: &Path) -> String {
+    let mut lines = output::first_lines(&found.unusable, None, verbose);
+    if verbose {
+        lines.extend(found.warnings.iter().map(|warning| format!("note: {warning}")));
+    }
+    lines.extend(found.effects.iter().map(report::servos::effect_in_words));
+    if found.effects.is_empty() {
+        lines.push(
+            "nothing is named: no candidate lowers the position error on the validation logs".to_string(),
+        );
+    }
+    for (j, verdict) in found.verdict.iter().enumerate() {
+        let of = |both: &powerball_explanation::servo::Both| both.validate.position_error[j];
+        lines.push(format!(
+            "joint {}: position error {:.4} rad held out, {:.4} with what was named; {}",
+            verdict.joint,
+            of(&found.before),
+            of(&found.after),
+            verdict.state
+        ));
     }
     lines.extend(output::notes(found.warnings.len()).filter(|_| !verbose));
     lines.push(format!("report: {}", out.join("report.html").display()));
