@@ -139,3 +139,38 @@ fn number(r: &mut Reader<'_>, v: &Value<'_>, quantity: &str, unit: &str, range: 
     }
     fits.then_some(number)
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::Arm;
+
+    const JOINT: &str = "name = \"one\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n[[joint]]\nkind = \"revolute\"\n\
+                         a = 0.1\nalpha = 0\nd = 0\ntheta = 0\n";
+
+    #[test]
+    fn what_is_known_of_a_servo_is_read_and_the_rest_is_unknown() {
+        let text = format!(
+            "{JOINT}[joint.servo]\nkp = 16\nsupply = 12.0\ntorque_constant = 3.5\nresistance = 7\nkd = 0\n"
+        );
+        let arm = Arm::parse(&text, "one.toml").unwrap();
+        let servo = arm.joints[0].servo.clone().unwrap();
+        assert_eq!((servo.kp, servo.kd, servo.gain), (Some(16.0), Some(0.0), None));
+        assert_eq!((servo.stall_torque(), servo.back_emf()), (Some(6.0), Some(1.75)));
+        assert_eq!(Arm::parse(JOINT, "one.toml").unwrap().joints[0].servo, None);
+    }
+
+    #[test]
+    fn what_cannot_be_is_named_with_its_place() {
+        let wrong = |table: &str| Arm::parse(&format!("{JOINT}{table}"), "one.toml").unwrap_err().to_string();
+        let all = wrong("[joint.servo]\nkp = 0\npwm_limit = 1.2\ndelay = -1\ngains = 2\n");
+        for part in [
+            "one.toml:11:6: joint 1: servo: kp must be greater than zero",
+            "servo: pwm_limit must be above 0 and not above 1",
+            "servo: delay must be zero or greater (s), found -1",
+            "joint 1: servo: unknown key 'gains': known are kp, ki, kd",
+        ] {
+            assert!(all.contains(part), "{all}");
+        }
+        assert!(wrong("servo = 3\n").contains("write [joint.servo]"));
+    }
+}

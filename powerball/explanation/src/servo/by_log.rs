@@ -1,8 +1,8 @@
 //! What one log of position servos has that the others do not: another mass at the end of the arm, or another gain.
 //!
 //! Each log is asked alone, with the servo as it was found on all: which mass, or which gain, would lower its position error?
-//! A log is unlike the others where one of them takes away half of its squared error and is larger than what the same question
-//! gives on the other logs by chance.
+//! A log is unlike the others where its squared error is twice theirs, one of them takes away half of it, and is larger than
+//! what the same question gives on the other logs by chance.
 
 use crate::rule::Rule;
 use powerball_identification::servo::constants::Constant;
@@ -118,12 +118,18 @@ pub(super) fn spread(sizes: &[[Option<Size>; 2]], odd: &[bool], change: Change) 
 /// Which logs are unlike the others: by log, the change that explains it best.
 pub(super) fn odd(sizes: &[[Option<Size>; 2]], rule: &Rule) -> Vec<Option<Change>> {
     let none = vec![false; sizes.len()];
+    let mut errors: Vec<f64> =
+        sizes.iter().flat_map(|of| of.iter().flatten().next()).map(|size| size.before).collect();
+    errors.sort_by(f64::total_cmp);
+    let usual = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
     let spreads = Change::ALL.map(|change| spread(sizes, &none, change));
     let best = |of: &[Option<Size>; 2]| -> Option<Change> {
         let clear = |change: &Change| {
             of[*change as usize].is_some_and(|size| {
                 let error = size.std.hypot(spreads[*change as usize]);
-                size.left() <= rule.event_left && (size.value - change.none()).abs() > CLEAR * error
+                let is_large = size.before > rule.odd_log * usual;
+                is_large
+                    && size.left() <= rule.event_left && (size.value - change.none()).abs() > CLEAR * error
             })
         };
         let left = |change: &Change| of[*change as usize].map_or(f64::INFINITY, |size| size.after);

@@ -120,7 +120,8 @@ fn best_candidate<'l>(
     let level = rule.family_wise / (CANDIDATES.len() * arm.body.dof()) as f64;
     let mut tried = tried.into_iter();
     let (best, name, left, p_value) = tried.next()?;
-    if left > 1.0 - rule.least_gain || p_value > level {
+    let is_sure = left <= 1.0 - rule.large_gain || p_value <= level;
+    if left > 1.0 - rule.least_gain || !is_sure {
         return None;
     }
     let count = before.len() as f64 * best.problem.block() as f64;

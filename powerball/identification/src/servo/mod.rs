@@ -13,6 +13,8 @@ pub mod fit;
 mod problem;
 mod result;
 pub mod simulate;
+#[cfg(test)]
+mod tests;
 mod uncertainty;
 
 use crate::identify::IdentifyError;

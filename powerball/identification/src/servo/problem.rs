@@ -355,12 +355,15 @@ impl<'l> Problem<'l> {
         self.tracks.iter().map(|track| track.t.len().div_ceil(block)).sum()
     }
 
-    /// Errors of the goal that comes later by `delay`, by track, rad: what anybody knows without a model.
+    /// Errors of the goal that comes later by `delay`, by track, rad: what anybody knows without a model. A drive that is
+    /// switched off has no goal.
     #[must_use]
     pub fn goal_errors(&self, delay: f64) -> Vec<Vec<f64>> {
         use powerball_logs::signal::resample::linear_at;
         let of = |track: &Track<'_>| -> Vec<f64> {
-            track.t.iter().zip(track.q).map(|(t, q)| linear_at(track.t, track.goal, t - delay) - q).collect()
+            let is_on = |k: &usize| track.on.is_none_or(|on| on[*k]);
+            let error = |k: usize| linear_at(track.t, track.goal, track.t[k] - delay) - track.q[k];
+            (0..track.t.len()).filter(is_on).map(error).collect()
         };
         self.tracks.iter().map(of).collect()
     }

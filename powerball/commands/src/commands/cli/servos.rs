@@ -30,6 +30,13 @@ impl Masses {
         path.map(|path| Values::read(path)).transpose().map_err(|e| Failure::Unusable(e.to_string()))
     }
 
+    /// What is to be reported about them.
+    fn note(&self, arm: &Path) -> Option<String> {
+        let imported = arm.with_extension("values.json");
+        let is_used = self.values.is_none() && imported.is_file();
+        is_used.then(|| format!("{}: the masses are taken from it", imported.display()))
+    }
+
     /// The arm with what is known of it.
     pub(super) fn arm(&self, arm: &Arm, file: &Path) -> Result<ServoArm, Failure> {
         Ok(ServoArm::new(arm, self.read(file)?.as_ref())?)
@@ -107,7 +114,7 @@ pub(super) fn identify(
     terminal.say("reading logs");
     let read = ServoLogs::read(asked.logs.0, asked.logs.1, asked.arm.0)?;
     let mut found = identify_servos(&arm, &read.fit, &read.validate, logs::Progress::to(&say))?;
-    found.warnings.splice(0..0, read.warnings);
+    found.warnings.splice(0..0, asked.masses.note(asked.arm.1).into_iter().chain(read.warnings));
     let files = report::servos::files(&found).map_err(Failure::Refused)?;
     output::write_all(&files, asked.out)?;
     if asked.json {
@@ -158,7 +165,7 @@ pub(super) fn explain(
     let read = ServoLogs::read(asked.logs.0, asked.logs.1, asked.arm.0)?;
     let progress = logs::Progress::to(&say);
     let mut found = explain_servos(&arm, &read.fit, &read.validate, &Rule::default(), progress)?;
-    found.warnings.splice(0..0, read.warnings);
+    found.warnings.splice(0..0, asked.masses.note(asked.arm.1).into_iter().chain(read.warnings));
     let files = report::servos::explained(&found).map_err(Failure::Refused)?;
     output::write_all(&files, asked.out)?;
     if asked.json {
