@@ -17,6 +17,8 @@ const GAINS: [f64; 7] = [0.2, 0.35, 0.6, 1.0, 1.6, 2.7, 4.5];
 /// How many of them are refined, in how many steps.
 const REFINED: usize = 3;
 const STEPS: usize = 20;
+/// Sizes that differ by less than this share of them are one change.
+const ALIKE: f64 = 0.3;
 /// Standard errors that a change must be away from none.
 const CLEAR: f64 = 3.0;
 
@@ -129,11 +131,38 @@ pub(super) fn odd(sizes: &[[Option<Size>; 2]], rule: &Rule) -> Vec<Option<Change
                 let error = size.std.hypot(spreads[*change as usize]);
                 let is_large = size.before > rule.odd_log * usual;
                 is_large
-                    && size.left() <= rule.event_left && (size.value - change.none()).abs() > CLEAR * error
+                    && size.left() <= rule.event_left
+                    && (size.value - change.none()).abs() > CLEAR * error
             })
         };
         let left = |change: &Change| of[*change as usize].map_or(f64::INFINITY, |size| size.after);
         Change::ALL.into_iter().filter(clear).min_by(|a, b| left(a).total_cmp(&left(b)))
     };
     sizes.iter().map(best).collect()
+}
+
+/// The logs of each change, those whose sizes agree together: two loads are two effects.
+pub(super) fn groups(changes: &[Option<Change>], sizes: &[[Option<Size>; 2]]) -> Vec<(Change, Vec<usize>)> {
+    let mut groups: Vec<(Change, Vec<usize>)> = Vec::new();
+    for change in Change::ALL {
+        let of = |k: &usize| sizes[*k][change as usize];
+        let mut own: Vec<usize> = (0..changes.len()).filter(|k| changes[*k] == Some(change)).collect();
+        own.sort_by(|a, b| of(a).map_or(0.0, |s| s.value).total_cmp(&of(b).map_or(0.0, |s| s.value)));
+        let mut last: Option<Size> = None;
+        for k in own {
+            let Some(size) = of(&k) else { continue };
+            let apart = |last: Size| {
+                let difference = (size.value - last.value).abs();
+                let share =
+                    difference / (size.value - change.none()).abs().max((last.value - change.none()).abs());
+                difference > CLEAR * size.std.hypot(last.std) && share > ALIKE
+            };
+            match groups.last_mut() {
+                Some((of, logs)) if *of == change && !last.is_some_and(apart) => logs.push(k),
+                _ => groups.push((change, vec![k])),
+            }
+            last = Some(size);
+        }
+    }
+    groups
 }

@@ -6,6 +6,8 @@
 
 mod by_log;
 mod result;
+#[cfg(test)]
+mod tests;
 
 use crate::rule::Rule;
 use by_log::{Change, Size};
@@ -200,25 +202,27 @@ fn p_value(before: &[f64], after: &[f64]) -> f64 {
 }
 
 /// What single logs have on a joint.
-struct Odd {
+struct Odd<'o> {
+    /// The servo with all friction, in each log.
+    each: Vec<Problem<'o>>,
     /// By log, those to fit first.
     changes: Vec<Option<Change>>,
     sizes: Vec<[Option<Size>; 2]>,
 }
 
-impl Odd {
+impl<'o> Odd<'o> {
     /// Held against the servo as logs `like` have it.
     fn in_logs(
         arm: &ServoArm,
         like: &[ServoLog],
-        (logs, validate): (&[ServoLog], &[ServoLog]),
+        (logs, validate): (&'o [ServoLog], &'o [ServoLog]),
         j: usize,
         rule: &Rule,
-    ) -> Result<Odd, IdentifyError> {
+    ) -> Result<Odd<'o>, IdentifyError> {
         let joint = Joint::fit(arm, like, j)?;
-        let problems = each_log(arm, &joint, (logs, validate), j);
-        let sizes = by_log::sizes(&problems);
-        Ok(Odd { changes: by_log::odd(&sizes, rule), sizes })
+        let each = each_log(arm, &joint, (logs, validate), j);
+        let sizes = by_log::sizes(&each);
+        Ok(Odd { changes: by_log::odd(&sizes, rule), sizes, each })
     }
 }
 
@@ -241,23 +245,19 @@ fn report_odd(
     arm: &ServoArm,
     joint: &Joint<'_>,
     (logs, validate): (&[ServoLog], &[ServoLog]),
-    odd: &Odd,
+    odd: &Odd<'_>,
     j: usize,
 ) {
     let number = JointNumber::from_index(j);
     let each = each_log(arm, joint, (logs, validate), j);
     let mut left: Vec<Vec<Vec<f64>>> = each.iter().map(|problem| errors(problem, &[])).collect();
     let is_odd: Vec<bool> = odd.changes.iter().map(Option::is_some).collect();
-    for change in Change::ALL {
-        let own: Vec<usize> = (0..each.len()).filter(|k| odd.changes[*k] == Some(change)).collect();
-        if own.is_empty() {
-            continue;
-        }
-        let together = each[own[0]].clone().and(own[1..].iter().map(|k| &each[*k]));
+    for (change, own) in by_log::groups(&odd.changes, &odd.sizes) {
+        let together = odd.each[own[0]].clone().and(own[1..].iter().map(|k| &odd.each[*k]));
         let Some(size) = by_log::size(&together, change) else { continue };
         let spread = by_log::spread(&odd.sizes, &is_odd, change) / (own.len() as f64).sqrt();
         let std = size.std.hypot(spread).hypot(between(&odd.sizes, &own, change));
-        let (before, squares) = (rms_of(&left, &own), change_errors(&each, &own, change, size.value));
+        let (before, squares) = (rms_of(&left, &own), change_errors(&odd.each, &own, change, size.value));
         own.iter().zip(squares).for_each(|(k, with)| left[*k] = with);
         let freedom = together.blocks().saturating_sub(1).max(1) as f64;
         let p_value = f_tail(((size.value - change.none()) / std).powi(2), 1.0, freedom);

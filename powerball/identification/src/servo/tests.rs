@@ -4,25 +4,10 @@ use super::constants::{Constant, Constants};
 use super::simulate::{Track, simulate};
 use super::*;
 use powerball_logs::log::ServoLog;
-use std::path::PathBuf;
-use std::process::Command;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use servos::{GAINS, LENGTHS, MASSES, Measured, pendulum, point};
 
-const MASSES: &str = "{\"m1\": 0.8, \"mx1\": 0, \"my1\": 0, \"mz1\": 0, \"Ixx1\": 0, \"Ixy1\": 0, \"Ixz1\": 0, \"Iyy1\": 0, \
-                      \"Iyz1\": 0, \"Izz1\": 0}";
-
-/// A pendulum of one link of a length, m, that hangs at q = 0.
-fn pendulum(length: f64, servo: &str) -> Arm {
-    let text = format!(
-        "name = \"pendulum\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n[[joint]]\nkind = \"revolute\"\n\
-         a = {length}\nalpha = 0\nd = 0\ntheta = \"-pi/2\"\n[joint.servo]\n{servo}"
-    );
-    Arm::parse(&text, "pendulum.toml").unwrap()
-}
-
-fn values(masses: &str) -> Values {
-    Values::parse(masses, "masses.json").unwrap()
-}
+#[path = "../../../../tests/support/servos.rs"]
+mod servos;
 
 /// The truth of the synthetic servo.
 fn truth() -> Constants {
@@ -43,7 +28,13 @@ fn truth() -> Constants {
 }
 
 /// The same servo by explicit steps of 20 µs and Karnopp's stick: a joint rests while the torque on it is below friction.
-fn karnopp(t: &[f64], goal: impl Fn(f64) -> f64, off_from: f64, c: &Constants, (mass, length): (f64, f64)) -> Vec<f64> {
+fn karnopp(
+    t: &[f64],
+    goal: impl Fn(f64) -> f64,
+    off_from: f64,
+    c: &Constants,
+    (mass, length): (f64, f64),
+) -> Vec<f64> {
     let (h, of) = (2e-5, |constant| c.of(constant));
     let (mut q, mut v, mut wanted, mut time) = (0.0f64, 0.0f64, goal(-of(Constant::Delay)), 0.0);
     let inertia = mass * length * length + of(Constant::Armature);
@@ -95,7 +86,7 @@ fn synthetic(arm: &Arm) -> Vec<ServoLog> {
 fn a_servo_of_another_formulation_is_recovered() {
     let arm = pendulum(0.12, "kp = 16");
     let logs = synthetic(&arm);
-    let servos = ServoArm::new(&arm, Some(&values(MASSES))).unwrap();
+    let servos = ServoArm::new(&arm, Some(&point(0.8))).unwrap();
     let found = identify_servos(&servos, &logs, &[], Progress::default()).unwrap();
     assert!(found.unusable.is_empty(), "{:?}", found.unusable);
     assert!(found.fit.position_error[0] < 5e-3, "{:?}", found.fit);
@@ -126,7 +117,7 @@ fn without_masses_torques_are_shares_of_the_torque_at_full_duty() {
 /// Switched off and without friction it is a pendulum; at full duty it runs at torque/back_emf; friction holds it.
 #[test]
 fn closed_forms_are_met() {
-    let arm = ServoArm::new(&pendulum(0.12, "kp = 1"), Some(&values(MASSES))).unwrap();
+    let arm = ServoArm::new(&pendulum(0.12, "kp = 1"), Some(&point(0.8))).unwrap();
     let t: Vec<f64> = (0..2000).map(|k| 1e-3 * f64::from(k)).collect();
     let (rest, still) = (vec![0.05; t.len()], vec![0.0; t.len()]);
     let log = |q: &[f64], goal: &[f64]| {
@@ -157,7 +148,9 @@ fn closed_forms_are_met() {
 #[test]
 fn the_body_of_a_joint_is_the_arms_inverse_dynamics() {
     let joint = |a: f64, alpha: &str| {
-        format!("[[joint]]\nkind = \"revolute\"\na = {a}\nalpha = {alpha}\nd = 0.1\ntheta = 0\n[joint.servo]\nkp = 1\n")
+        format!(
+            "[[joint]]\nkind = \"revolute\"\na = {a}\nalpha = {alpha}\nd = 0.1\ntheta = 0\n[joint.servo]\nkp = 1\n"
+        )
     };
     let text = format!(
         "name = \"three\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\n{}{}{}",
@@ -201,42 +194,6 @@ fn what_cannot_be_simulated_is_refused() {
     assert!(why.contains("joint 1 is prismatic"), "{why}");
 }
 
-/// The folder of the measured servo's logs, unpacked; `None`, and a line that says so, where they are not at hand.
-fn measured() -> Option<Unpacked> {
-    let folder = std::env::var_os("POWERBALL_DATA")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from);
-    let archive = folder.join("sts3215.tar.xz");
-    if !archive.exists() {
-        println!("skipped: there is no {}", archive.display());
-        return None;
-    }
-    static COUNT: AtomicUsize = AtomicUsize::new(0);
-    let number = COUNT.fetch_add(1, Ordering::Relaxed);
-    let to = std::env::temp_dir().join(format!("powerball_servo_{}_{number}", std::process::id()));
-    std::fs::create_dir_all(&to).unwrap();
-    let unpacked = Command::new("tar").arg("xJf").arg(&archive).arg("-C").arg(&to).status();
-    if !unpacked.is_ok_and(|status| status.success()) {
-        println!("skipped: tar cannot unpack {}", archive.display());
-        return None;
-    }
-    Some(Unpacked(to))
-}
-
-/// A folder that goes with its last use.
-struct Unpacked(PathBuf);
-
-impl Unpacked {
-    fn logs(&self) -> PathBuf {
-        self.0.join("shared")
-    }
-}
-
-impl Drop for Unpacked {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
-
 /// Extended friction model M6 of Duclusaud et al. with the values that the owners of the logs found for this servo.
 fn m6(log: &ServoLog, (mass, length, kp): (f64, f64, f64)) -> Vec<f64> {
     let (k, r, armature, offset, stribeck) = (3.5555, 7.1214, 0.0283, -0.0140, 0.0840);
@@ -261,28 +218,20 @@ fn m6(log: &ServoLog, (mass, length, kp): (f64, f64, f64)) -> Vec<f64> {
     out.iter().zip(&log.q[0]).map(|(s, q)| s - q).collect()
 }
 
-const PATHS: [&str; 5] = ["brutal", "lift_and_drop", "sin_sin", "sin_time_square", "up_and_down"];
-
 /// Held-out error of the fit and of M6, rad, of one load and gain.
-fn held_out(folder: &std::path::Path, mass: (&str, f64), length: f64, kp: u32) -> [f64; 2] {
+fn held_out(measured: &Measured, (name, mass): (&str, f64), length: f64, kp: u32) -> [f64; 2] {
     let arm = pendulum(length, &format!("kp = {kp}"));
-    let read = |repetition: u32| -> Vec<ServoLog> {
-        let file = |path: &&str| folder.join(format!("m{}_l{:.0}_kp{kp}_{path}_{repetition}.csv", mass.0, 1e3 * length));
-        PATHS.iter().map(|path| ServoLog::read(&file(path), &arm, &Default::default()).unwrap().0).collect()
-    };
-    let (logs, validate) = (read(1), read(2));
-    let masses = values(&MASSES.replace("0.8", &mass.1.to_string()));
-    let servos = ServoArm::new(&arm, Some(&masses)).unwrap();
+    let [logs, validate] = [1, 2].map(|repetition| measured.logs((name, length, kp), repetition));
+    let servos = ServoArm::new(&arm, Some(&point(mass))).unwrap();
     let found = identify_servos(&servos, &logs, &validate, Progress::default()).unwrap();
-    let others: Vec<Vec<f64>> =
-        validate.iter().map(|log| m6(log, (mass.1, length, f64::from(kp)))).collect();
-    [found.validate.unwrap().position_error[0], rms(&others)]
+    let of_m6 = |log: &ServoLog| m6(log, (mass, length, f64::from(kp)));
+    [found.validate.unwrap().position_error[0], rms(&validate.iter().map(of_m6).collect::<Vec<_>>())]
 }
 
 #[test]
 fn a_measured_servo_is_predicted_better_than_by_its_owners_model() {
-    let Some(folder) = measured() else { return };
-    let [own, m6] = held_out(&folder.logs(), ("0.535", 0.535), 0.15, 16);
+    let Some(measured) = Measured::unpack() else { return };
+    let [own, m6] = held_out(&measured, MASSES[0], 0.15, 16);
     println!("held out {own:.4} rad, M6 {m6:.4} rad");
     assert!(own < 0.5 * m6, "{own} {m6}");
 }
@@ -290,12 +239,12 @@ fn a_measured_servo_is_predicted_better_than_by_its_owners_model() {
 #[test]
 #[ignore = "at_length: twelve fits"]
 fn every_load_and_gain_is_predicted_better_than_by_its_owners_model() {
-    let Some(folder) = measured() else { return };
+    let Some(measured) = Measured::unpack() else { return };
     let (mut sums, mut count) = ([0.0, 0.0], 0.0);
-    for mass in [("0.535", 0.535), ("1.168", 1.1682)] {
-        for length in [0.1, 0.15] {
-            for kp in [8, 16, 32] {
-                let [own, m6] = held_out(&folder.logs(), mass, length, kp);
+    for mass in MASSES {
+        for length in LENGTHS {
+            for kp in GAINS {
+                let [own, m6] = held_out(&measured, mass, length, kp);
                 println!("{} kg at {length} m, kp {kp}: held out {own:.4} rad, M6 {m6:.4} rad", mass.0);
                 (sums[0], sums[1], count) = (sums[0] + own, sums[1] + m6, count + 1.0);
             }

@@ -60,8 +60,8 @@ const UNIT_OF_LEROBOT: &str = "LeRobot does not say in which unit observation.st
     servo's range, or a share of that range from -100 to 100. Say it with --map 'q.unit = \"deg\"' (or \"rad\"); a share of \
     the range is no angle before it is multiplied by the range ('q.scale = […]')";
 const TORQUE_OF_LEROBOT: &str = ". LeRobot records torques or currents only where the robot was made to give them: name \
-    their column with --map 'tau.column = \"…\"' or 'i.column = \"…\"'; with the set-points in `action` alone, `identify` and \
-    `explain` take the joints for position servos";
+    their column with --map 'tau.column = \"…\"' or 'i.column = \"…\"'; `action` is a set-point, and without torques \
+    `identify` and `explain` take the joints for position servos";
 
 /// The columns of one quantity by joint, and what each is to be multiplied with.
 pub(super) struct Group {
