@@ -5,7 +5,7 @@ use super::headers::{self, Headers};
 use super::map::ColumnMap;
 use super::read::{Samples, read_asked};
 use super::{Doubt, Finding, LogError};
-use crate::tables::{Format, Place, RowSink, columnar, read_dataset, text};
+use crate::tables::{Format, Place, RowSink, columnar, is_address, read_dataset, text};
 use dyngen::Arm;
 use std::fs::File;
 use std::ops::Range;
@@ -108,6 +108,10 @@ pub fn is_of_servos(path: &Path, arm: &Arm, map: &ColumnMap) -> bool {
 
 /// The names of the columns of a file of one table; the rest of it is not read.
 fn names(path: &Path) -> Option<Vec<String>> {
+    // What is at an address is fetched once.
+    if is_address(path) {
+        return None;
+    }
     let place = Place::of(path).ok()?;
     let (file, mut names, mut notes) = (path.display().to_string(), Names::default(), Vec::new());
     // Whoever takes the names ends the reading.
