@@ -3,7 +3,7 @@
 use super::table::{Reader, Table, Value, describe, two_brackets};
 use super::{
     Angle, Arm, Convention, Frame, Grouping, Joint, JointKind, MAX_JOINTS, Parameter, ParameterKind,
-    Placement, mimic, sum, transmission,
+    Placement, mimic, servo, sum, transmission,
 };
 use crate::diagnostic::{Collector, Diagnostics, is_unseen, unseen};
 use crate::exact::rational::{self, Rational};
@@ -15,7 +15,7 @@ const ARM_KEYS: [&str; 9] =
     ["name", "convention", "gravity", "joint", "base", "tool", "frame", "grouping", "transmission"];
 const FRAME_KEYS: [&str; 4] = ["name", "link", "xyz", "rpy"];
 const PLACEMENT_KEYS: [&str; 2] = ["xyz", "rpy"];
-const JOINT_KEYS: [&str; 16] = [
+const JOINT_KEYS: [&str; 17] = [
     "name",
     "kind",
     "a",
@@ -32,6 +32,7 @@ const JOINT_KEYS: [&str; 16] = [
     "torque_constant",
     "mimic",
     "link_frame",
+    "servo",
 ];
 const GROUPING_KEYS: [&str; 2] = ["name", "sum"];
 /// A larger file is no arm.
@@ -208,6 +209,7 @@ impl Reader<'_> {
         let link_frame = self.optional(t, "link_frame", |r, v| {
             r.placement(v, &format!("{place}: link_frame"), "the link's frame")
         });
+        let servo = self.optional(t, "servo", |r, v| servo::read(r, v, &place));
         Some(Joint {
             name: name?,
             kind: kind?,
@@ -225,6 +227,7 @@ impl Reader<'_> {
             torque_constant: torque_constant?,
             mimic: mimic?,
             link_frame: link_frame?,
+            servo: servo?,
         })
     }
 
