@@ -211,7 +211,7 @@ struct Odd<'o> {
 }
 
 impl<'o> Odd<'o> {
-    /// Held against the servo as logs `like` have it.
+    /// Compared with the servo in the logs `like`.
     fn in_logs(
         arm: &ServoArm,
         like: &[ServoLog],
