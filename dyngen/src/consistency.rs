@@ -57,7 +57,7 @@ pub fn check(model: &Model, kind: SetKind, values: &[f64]) -> Result<Possibility
     let set = model.set(kind)?;
     let mass = Evaluator::new(model, Function::MassMatrix, kind)?;
     let mut reasons = impossible_links(arm, set, values);
-    let search = Search { mass: &mass, values, n: arm.dof() };
+    let search = Search { matrix: &mass, values, rows: arm.dof() };
     let ((smallest, largest), pose, indefinite) = search.worst(arm);
     let share = indefinite as f64 / POSES as f64;
     if smallest < -ROUNDING * largest.abs() {
@@ -79,18 +79,36 @@ pub fn check(model: &Model, kind: SetKind, values: &[f64]) -> Result<Possibility
     })
 }
 
+/// The smallest eigenvalue of a function that is a symmetric matrix of at most [`MAX_JOINTS`] rows, and the pose within
+/// the limits where it was found, rad or m.
+///
+/// # Errors
+/// As [`Model::function`].
+pub(crate) fn smallest_eigenvalue(
+    model: &Model,
+    function: Function,
+    kind: SetKind,
+    values: &[f64],
+) -> Result<(f64, Vec<f64>), Error> {
+    let matrix = Evaluator::new(model, function, kind)?;
+    let (rows, _) = function.shape(model.arm().dof(), values.len());
+    let ((smallest, _), pose, _) = Search { matrix: &matrix, values, rows }.worst(model.arm());
+    Ok((smallest, pose))
+}
+
+/// Poses at which a symmetric matrix is worst.
 struct Search<'a> {
-    mass: &'a Evaluator,
+    matrix: &'a Evaluator,
     values: &'a [f64],
-    n: usize,
+    rows: usize,
 }
 
 impl Search<'_> {
-    /// Smallest and largest eigenvalue of B at a pose.
+    /// Smallest and largest eigenvalue of the matrix at a pose.
     fn extremes(&self, q: &[f64]) -> (f64, f64) {
-        let n = self.n;
+        let n = self.rows;
         let mut flat = vec![0.0; n * n];
-        self.mass.evaluate(q, &[], &[], self.values, &mut flat);
+        self.matrix.evaluate(q, &[], &[], self.values, &mut flat);
         if flat.iter().any(|x| !x.is_finite()) {
             return (f64::NEG_INFINITY, f64::INFINITY);
         }
@@ -141,7 +159,7 @@ impl Search<'_> {
     fn refine(&self, value: &mut f64, q: &mut [f64], limits: &[[f64; 2]]) {
         for round in 0..12 {
             let step = 0.5f64.powi(round);
-            for i in 0..self.n {
+            for i in 0..q.len() {
                 for direction in [step, -step] {
                     let old = q[i];
                     q[i] = (old + direction).clamp(limits[i][0], limits[i][1]);

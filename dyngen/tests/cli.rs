@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -84,11 +85,25 @@ fn describe_bounds_the_rounding_where_the_arm_has_limits() {
             assert!(*d <= 1.1 * s * 2f64.powi(-29) && *s < 1e-3, "{function}: {s:e} {d:e}");
         }
     }
+    // B is positive for these values: accelerations have a bound.
+    let accelerations = of(&given, "forward_dynamics", "f32");
+    assert!(accelerations.len() == 6 && accelerations.iter().all(|x| *x < 2e-3), "{accelerations:?}");
     // No bound is no number, with the reason.
-    let division = &given["rounding"]["forward_dynamics"];
-    assert!(division["f32"][0].is_null() && division["why"].as_str().unwrap().contains("division"));
+    let all = given["rounding"].as_object().unwrap();
+    let without = all.iter().filter(|(_, of)| of.get("why").is_some()).map(|(f, _)| f.as_str());
+    let expected = ["forward_dynamics_with_payload", "task_inertia", "dynamically_consistent_inverse"];
+    assert_eq!(without.collect::<BTreeSet<_>>(), BTreeSet::from(expected));
+    let singular = &given["rounding"]["task_inertia"];
+    assert!(
+        singular["f32"].is_null() && singular["why"].as_str().unwrap().contains("at q = ["),
+        "{singular}"
+    );
+    let why = unit["rounding"]["forward_dynamics"]["why"].as_str().unwrap();
+    assert!(why.contains("--values"), "{why}");
     let table = text(&dyngen(&["describe", &geared]).stdout);
-    assert!(table.contains("rounding: |emitted − exact|") && table.contains("none for "), "{table}");
+    for part in ["rounding: |emitted − exact|", "none for ", "τ in f32, joint by joint: "] {
+        assert!(table.contains(part), "{part}: {table}");
+    }
     let wrong = dyngen(&["describe", &geared, "--values", &geared]);
     assert_eq!(wrong.status.code(), Some(2));
 }
@@ -535,4 +550,23 @@ fn what_no_arm_can_have_is_said() {
         assert_eq!(generate(&arm, &values(0.1), &["--accept"]).status.code(), Some(0));
         assert_eq!(dyngen(&["describe", &arm]).status.code(), Some(3));
     }
+}
+
+#[test]
+fn help_lists_every_function_and_generate_says_what_it_wrote() {
+    for command in ["eval", "generate"] {
+        let help = text(&dyngen(&[command, "--help"]).stdout);
+        for function in dyngen::Function::ALL {
+            let line = help.lines().find(|line| line.trim_start().starts_with(&format!("{function} ")));
+            assert!(line.is_some_and(|line| line.contains(function.meaning().0)), "{command}: {function}");
+        }
+    }
+    let out = file("said.rs", "");
+    let generate = |more: &[&str]| {
+        let given = ["generate", &arm(), "-o", &out, "--functions", "gravity,jacobian"];
+        text(&dyngen(&[&given[..], more].concat()).stderr)
+    };
+    let said = generate(&[]);
+    assert!(said.lines().count() == 1 && said.contains("said.rs") && said.contains("2 of them"), "{said}");
+    assert_eq!(generate(&["--quiet"]), "");
 }

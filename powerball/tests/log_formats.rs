@@ -7,7 +7,7 @@
 use dyngen::Arm;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use powerball::Log;
-use powerball::logs::log::{ColumnMap, Finding};
+use powerball::logs::log::{ColumnMap, Finding, ServoLog};
 use powerball::logs::tables::{Contents, JointState, McapWriter, read_contents};
 use std::path::{Path, PathBuf};
 
@@ -407,6 +407,23 @@ fn every_type_of_parquet_that_holds_numbers_is_numbers() {
 }
 
 // LeRobot.
+
+/// For an arm on position servos the actions of a dataset are set-points, in the unit of its positions.
+#[test]
+fn actions_of_lerobot_are_set_points_of_servos() {
+    let (csv, _) = read(&data("log.csv"), "");
+    let map = ColumnMap::parse(&format!("{JOINTS}q.unit = \"deg\""), "map").unwrap();
+    for name in ["lerobot_v21", "lerobot_v30"] {
+        let (log, _) = ServoLog::read(&data(name), &arm(), &map).unwrap();
+        assert_eq!(log.pieces, [0..40, 40..90, 90..120], "{name}");
+        assert_eq!((log.goal.len(), log.goal[1].len()), (2, 120), "{name}");
+        let off = |(a, b): (&f64, &f64)| (a - b).abs();
+        for own in [&log.q, &log.goal] {
+            let worst = own.iter().flatten().zip(csv.q.iter().flatten()).map(off).fold(0.0, f64::max);
+            assert!(worst < 1e-7, "{name}: {worst}");
+        }
+    }
+}
 
 /// A dataset's folder, or its description, of both layouts: episodes are pieces, joints go by name, and what LeRobot does
 /// not say is asked for.

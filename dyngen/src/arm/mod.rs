@@ -3,6 +3,7 @@
 mod mimic;
 pub mod parameter;
 mod read;
+mod servo;
 pub mod sum;
 mod table;
 pub mod transmission;
@@ -16,12 +17,13 @@ use num_traits::{One, Zero};
 pub use parameter::{Parameter, ParameterKind};
 #[cfg(feature = "urdf")]
 pub(crate) use read::is_name;
+pub use servo::Servo;
 use std::fmt;
 use std::path::Path;
 pub use transmission::Transmission;
 
 /// The most joints an arm may have.
-pub const MAX_JOINTS: usize = 16;
+pub const MAX_JOINTS: usize = 20;
 
 /// Which Denavit–Hartenberg convention the table follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,6 +81,8 @@ pub struct Joint {
     /// The frame in which a robot description has the link, in the frame of the table, where it is another: points of
     /// the link are reported in it.
     pub link_frame: Option<Placement>,
+    /// Its drive, where that is a position servo.
+    pub servo: Option<Servo>,
 }
 
 /// What the file does not say is left out, as for [`Arm`].
@@ -107,6 +111,9 @@ impl fmt::Debug for Joint {
         }
         if let Some(frame) = &self.link_frame {
             text.field("link_frame", frame);
+        }
+        if let Some(servo) = &self.servo {
+            text.field("servo", servo);
         }
         text.finish()
     }

@@ -1,20 +1,21 @@
 //! From TOML to [`Arm`]: the typed description, or every error with its place.
 
-use super::table::{Reader, Table, Value, describe};
+use super::table::{Reader, Table, Value, describe, two_brackets};
 use super::{
     Angle, Arm, Convention, Frame, Grouping, Joint, JointKind, MAX_JOINTS, Parameter, ParameterKind,
-    Placement, mimic, sum, transmission,
+    Placement, mimic, servo, sum, transmission,
 };
 use crate::diagnostic::{Collector, Diagnostics, is_unseen, unseen};
 use crate::exact::rational::{self, Rational};
 use num_traits::{Signed, Zero};
+use std::ops::Range;
 use toml::de::DeTable;
 
 const ARM_KEYS: [&str; 9] =
     ["name", "convention", "gravity", "joint", "base", "tool", "frame", "grouping", "transmission"];
 const FRAME_KEYS: [&str; 4] = ["name", "link", "xyz", "rpy"];
 const PLACEMENT_KEYS: [&str; 2] = ["xyz", "rpy"];
-const JOINT_KEYS: [&str; 16] = [
+const JOINT_KEYS: [&str; 17] = [
     "name",
     "kind",
     "a",
@@ -31,6 +32,7 @@ const JOINT_KEYS: [&str; 16] = [
     "torque_constant",
     "mimic",
     "link_frame",
+    "servo",
 ];
 const GROUPING_KEYS: [&str; 2] = ["name", "sum"];
 /// A larger file is no arm.
@@ -47,9 +49,10 @@ pub(super) fn parse(text: &str, file: &str) -> Result<Arm, Diagnostics> {
     }
     let (document, errors) = DeTable::parse_recoverable(text);
     let broken = !errors.is_empty();
-    let other = broken.then(|| other_kind(text)).flatten();
-    if let Some(kind) = other {
-        reader.errors.error(0..0, kind);
+    let kind = || other_kind(text).map(|kind| (0..0, kind.to_string()));
+    let other = broken.then(|| kind().or_else(|| one_bracket(text))).flatten();
+    if let Some((span, kind)) = other.clone() {
+        reader.errors.error(span, kind);
     }
     for error in errors.into_iter().filter(|_| other.is_none()) {
         reader.errors.error(error.span().unwrap_or(0..0), format!("not valid TOML: {}", error.message()));
@@ -58,6 +61,24 @@ pub(super) fn parse(text: &str, file: &str) -> Result<Arm, Diagnostics> {
     let arm = if broken { None } else { reader.arm(document.get_ref()) };
     reader.errors.finish(arm)
 }
+
+/// Whether a table of a list stands in one bracket, which TOML takes for one table that is given twice.
+fn one_bracket(text: &str) -> Option<(Range<usize>, String)> {
+    LISTS.into_iter().find_map(|key| {
+        let header = format!("[{key}]");
+        let mut lines = text.split_inclusive('\n').scan(0, |at, line| {
+            *at += line.len();
+            Some((*at - line.len(), line))
+        });
+        let mut found = lines.by_ref().filter(|(_, line)| line.trim() == header);
+        let (at, _) = found.next()?;
+        found.next()?;
+        Some((at..at + header.len(), two_brackets(key)))
+    })
+}
+
+/// The keys whose tables are entries of a list.
+const LISTS: [&str; 4] = ["joint", "frame", "transmission", "grouping"];
 
 /// Whether a module may have this name.
 pub(crate) fn is_name(name: &str) -> bool {
@@ -188,6 +209,7 @@ impl Reader<'_> {
         let link_frame = self.optional(t, "link_frame", |r, v| {
             r.placement(v, &format!("{place}: link_frame"), "the link's frame")
         });
+        let servo = self.optional(t, "servo", |r, v| servo::read(r, v, &place));
         Some(Joint {
             name: name?,
             kind: kind?,
@@ -205,6 +227,7 @@ impl Reader<'_> {
             torque_constant: torque_constant?,
             mimic: mimic?,
             link_frame: link_frame?,
+            servo: servo?,
         })
     }
 

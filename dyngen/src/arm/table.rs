@@ -117,7 +117,7 @@ impl Reader<'_> {
         let Some(value) = t.table.get(key) else { return Vec::new() };
         let Some(list) = value.get_ref().as_array() else {
             let message = match value.get_ref().is_table() {
-                true => format!("write [[{key}]] with two brackets: each {key} is one entry of a list"),
+                true => two_brackets(key),
                 false => format!("{key} must be a list of tables: write [[{key}]]"),
             };
             self.errors.error(value.span(), message);
@@ -157,4 +157,9 @@ pub(super) fn describe(v: &Value<'_>) -> String {
         DeValue::Array(a) => format!("a list of {}", a.iter().count()),
         other => format!("a value of type {}", other.type_str()),
     }
+}
+
+/// What a table in one bracket should be.
+pub(super) fn two_brackets(key: &str) -> String {
+    format!("write [[{key}]] with two brackets: each {key} is one entry of a list")
 }

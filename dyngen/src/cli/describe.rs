@@ -10,7 +10,7 @@ use dyngen::base::{ParameterSet, SetKind};
 use dyngen::describe::{Description, Rounding, Weak, exact_rows, why_unbounded};
 use dyngen::exact::rational::{self, Rational};
 use dyngen::graph::Operations;
-use dyngen::{Model, Values};
+use dyngen::{Function, Model, Values};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -71,7 +71,7 @@ fn table(model: &Model, description: &Description, digits: Digits) -> String {
     choice_of_columns(&mut t, model);
     operation_table(&mut t, operations);
     if let Some(rounding) = rounding {
-        rounding_table(&mut t, rounding);
+        rounding_table(&mut t, arm, rounding);
     }
     t
 }
@@ -230,21 +230,24 @@ fn operation_table(t: &mut String, operations: &[(&'static str, Operations)]) {
 }
 
 /// By how much the worst entry of each function may be off.
-fn rounding_table(t: &mut String, rounding: &Rounding) {
+fn rounding_table(t: &mut String, arm: &Arm, rounding: &Rounding) {
     let _ = writeln!(
         t,
         "\nrounding: |emitted − exact| of each function's worst entry, in its unit, for every state within the \
          limits\n(parameters: {}):",
         rounding.parameters.text()
     );
-    let _ = writeln!(t, "  {:<36} {:>8} {:>8}", "function", "f32", "f64");
+    let _ = writeln!(t, "  {:<36} {:>8} {:>8}  decimals that hold in f32, f64", "function", "f32", "f64");
     for (function, bounds) in &rounding.functions {
         if let (Ok(of), None) = (bounds, why_unbounded(bounds)) {
             let worst = |all: &[f64]| all.iter().copied().fold(0.0, f64::max);
             let name = function.name();
-            let _ = writeln!(t, "  {name:<36} {:>8.1e} {:>8.1e}", worst(&of.single), worst(&of.double));
+            let [single, double] = [worst(&of.single), worst(&of.double)];
+            let [few, many] = [single, double].map(decimals);
+            let _ = writeln!(t, "  {name:<36} {single:>8.1e} {double:>8.1e}  {few:>8} {many:>4}");
         }
     }
+    by_joint(t, arm, rounding);
     let mut none: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
     for (function, bounds) in &rounding.functions {
         if let Some(why) = why_unbounded(bounds) {
@@ -253,6 +256,33 @@ fn rounding_table(t: &mut String, rounding: &Rounding) {
     }
     for (why, functions) in none {
         let _ = writeln!(t, "  none for {}: {why}", functions.join(", "));
+    }
+}
+
+/// How many digits after the point a bound leaves right to half a unit.
+fn decimals(bound: f64) -> String {
+    let digits = (-(2.0 * bound).log10()).floor();
+    if bound == 0.0 { "all".to_string() } else { format!("{:.0}", digits.max(0.0)) }
+}
+
+/// What each joint's torque and acceleration may be off.
+fn by_joint(t: &mut String, arm: &Arm, rounding: &Rounding) {
+    let units = [
+        (Function::InverseDynamics, "τ", ["N·m", "N"]),
+        (Function::ForwardDynamics, "q̈", ["rad/s²", "m/s²"]),
+    ];
+    for (function, letter, units) in units {
+        let found = rounding.functions.iter().find(|(f, _)| *f == function);
+        let Some((_, Ok(bounds))) = found.filter(|(_, bounds)| why_unbounded(bounds).is_none()) else {
+            continue;
+        };
+        for (precision, all) in [("f32", &bounds.single), ("f64", &bounds.double)] {
+            let entry = |(joint, bound): (&Joint, &f64)| {
+                format!("{bound:.1e} {}", units[usize::from(joint.kind == JointKind::Prismatic)])
+            };
+            let entries: Vec<String> = arm.moving_joints().zip(all).map(entry).collect();
+            let _ = writeln!(t, "  {letter} in {precision}, joint by joint: {}", entries.join(", "));
+        }
     }
 }
 

@@ -9,13 +9,13 @@ use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example: dyngen eval arm.toml --function inverse_dynamics --states states.csv --values \
-        values.json"
+    after_help = format!("{}\n\nExample: dyngen eval arm.toml --function inverse_dynamics --states states.csv \
+        --values values.json", generate::list_of_functions())
 )]
 pub(super) struct Args {
     /// The arm file.
     arm: PathBuf,
-    /// The function to evaluate.
+    /// The function to evaluate, of the list below.
     #[arg(long, value_parser = generate::function)]
     function: Function,
     /// States: a CSV file with a header line and the columns q1…, dq1…, ddq1… (tau1… for forward dynamics,

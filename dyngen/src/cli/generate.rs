@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
-#[command(after_help = "Example: dyngen generate arm.toml -o arm.rs --parameters minimal --functions \
+#[command(after_help = format!("{}\n\nExample: dyngen generate arm.toml -o arm.rs --parameters minimal --functions \
         regressor,mass_matrix\n         dyngen generate arm.toml --language c -o arm.c\n         dyngen generate \
-        arm.toml --language cuda -o arm.cu")]
+        arm.toml --language cuda -o arm.cu", list_of_functions()))]
 pub(super) struct Args {
     /// The arm file.
     arm: PathBuf,
@@ -22,7 +22,7 @@ pub(super) struct Args {
     /// The parameter set of every function.
     #[arg(long, value_enum, default_value = "minimal")]
     parameters: Set,
-    /// The functions, separated by commas; those that most controllers need where this is left out.
+    /// The functions of the list below, separated by commas; its first part where this is left out.
     #[arg(long, value_delimiter = ',', value_parser = function)]
     functions: Option<Vec<Function>>,
     /// Bake parameter values in: a JSON file {"parameter": number, …}, by the set's names or the arm's.
@@ -44,6 +44,9 @@ pub(super) struct Args {
     /// Write nothing; fail where a file on disk is not what would be written.
     #[arg(long)]
     check: bool,
+    /// Do not say what was written.
+    #[arg(short, long)]
+    quiet: bool,
 }
 
 /// A language on the command line.
@@ -108,6 +111,10 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     progress.iter().for_each(|p| p.say("deriving, proving and writing"));
     if !args.check {
         config.write(&args.output).map_err(failure)?;
+        drop(progress);
+        if !args.quiet {
+            say_what_was_written(args, &files);
+        }
         return Ok(ExitCode::SUCCESS);
     }
     for (file, expected) in config.texts(&args.output).map_err(failure)? {
@@ -122,6 +129,25 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// One line on standard error.
+fn say_what_was_written(args: &Args, files: &[PathBuf]) {
+    let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+    let functions = args.functions.as_ref().map_or_else(|| Function::common().count(), Vec::len);
+    eprintln!(
+        "wrote {}: functions of {}, {functions} of them, each proven",
+        names.join(" and "),
+        args.arm.display()
+    );
+}
+
+/// All functions with what they compute, those of a file that asks for none first.
+pub(super) fn list_of_functions() -> String {
+    let line = |function: Function| format!("  {:<38} {}\n", function.name(), function.meaning().0);
+    let common: String = Function::common().map(line).collect();
+    let others: String = Function::ALL.into_iter().skip(Function::common().count()).map(line).collect();
+    format!("Functions:\n{common}\nNot in a file unless they are asked for:\n{}", others.trim_end())
 }
 
 /// Whether a file begins as generated ones do.

@@ -160,7 +160,7 @@ impl Progress {
     fn new(arm: &Arm) -> Progress {
         let n = arm.links();
         let general = arm.joints.iter().filter(|joint| joint.alpha.quarter_turns().is_none()).count();
-        // Of arms of 2 to 16 joints in both conventions.
+        // Of arms of 2 to 20 joints in both conventions.
         let seconds = 0.012 * (n * n) as f64 * (1.0 + general as f64 / 9.0);
         let what = format!("{n} joints, {general} general twists, about {:.0} s", seconds.ceil());
         Progress { what: std::io::stderr().is_terminal().then_some(what) }

@@ -14,7 +14,7 @@ use crate::exact::rational;
 use crate::graph::{Operations, Preparation};
 use crate::model::{Error, Model};
 use crate::parameters::{ParameterSet, SetKind};
-use crate::rounding;
+use crate::rounding::Bounder;
 use serde_json::{Map, Value, json};
 use std::num::NonZero;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -57,9 +57,10 @@ impl Description {
         let mut rounding = Rounding::of(model.arm(), values);
         let functions: Vec<Function> = model.functions(SetKind::Minimal).collect();
         let bounded = rounding.is_some();
+        let bounder = Bounder::new(model, values);
         let of = |function: Function| {
             let built = model.function(function, SetKind::Minimal)?;
-            let bounds = bounded.then(|| rounding::bounds(model, &built, values));
+            let bounds = bounded.then(|| bounder.bounds(&built));
             Ok::<_, Error>((built, bounds))
         };
         say(&format!("proving {} functions", functions.len()));

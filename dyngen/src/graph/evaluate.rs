@@ -45,11 +45,24 @@ pub fn evaluate<F: Field>(
     input: impl Fn(Input) -> F,
     symbol: impl Fn(usize, bool) -> F,
 ) -> Option<Vec<F>> {
+    let values = nodes(graph, outputs, input, symbol)?;
+    outputs.iter().map(|e| signed(&values, *e)).collect()
+}
+
+fn signed<F: Field>(values: &[Option<F>], e: Expr) -> Option<F> {
+    let value = values[e.node()]?;
+    Some(if e.is_negative() { value.neg() } else { value })
+}
+
+/// As [`evaluate`], the values of all nodes that the outputs need.
+pub fn nodes<F: Field>(
+    graph: &Graph,
+    outputs: &[Expr],
+    input: impl Fn(Input) -> F,
+    symbol: impl Fn(usize, bool) -> F,
+) -> Option<Vec<Option<F>>> {
     let mut values: Vec<Option<F>> = vec![None; graph.nodes().len()];
-    let of = |values: &[Option<F>], e: Expr| -> Option<F> {
-        let value = values[e.node()]?;
-        Some(if e.is_negative() { value.neg() } else { value })
-    };
+    let of = signed::<F>;
     for node in graph.needed(outputs) {
         values[node] = match graph.nodes()[node] {
             Node::Constant(index) => F::constant(graph.constant(index)),
@@ -61,7 +74,7 @@ pub fn evaluate<F: Field>(
         };
         values[node]?;
     }
-    outputs.iter().map(|e| of(&values, *e)).collect()
+    Some(values)
 }
 
 /// Sine and cosine of a sum of angles by the addition theorem, from those of its joints.

@@ -5,8 +5,8 @@ use std::fmt;
 /// A joint's angle, or a sum or difference of several joints' angles; the first joint has the sign plus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct JointSum {
-    plus: u16,
-    minus: u16,
+    plus: u32,
+    minus: u32,
 }
 
 impl JointSum {

@@ -2,9 +2,9 @@
 
 use super::chain::{Chain, ChainJoint};
 use super::pose::Pose;
-use crate::arm::JointKind;
+use crate::arm::{JointKind, MAX_JOINTS};
 use crate::exact::prime::Draws;
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::{Rotation3, SMatrix, SVector, Vector3};
 use std::f64::consts::PI;
 
 /// Poses at which two arms are compared.
@@ -21,6 +21,8 @@ pub(super) struct Change {
     pub(super) inertia: f64,
     /// Of the torque of a joint that holds the arm still, gravity along −z of the root link, N·m (N).
     pub(super) torque: f64,
+    /// Of the acceleration of a joint when the arm falls from rest, rad/s² (m/s²).
+    pub(super) acceleration: f64,
 }
 
 impl Change {
@@ -43,6 +45,10 @@ impl Change {
                 (tip, matrix, torques)
             });
             change.torque = g.iter().zip(&h).fold(change.torque, |most, (g, h)| most.max((g - h).abs()));
+            let falls = [fall(&m, &g), fall(&n, &h)];
+            if let [Some(one), Some(other)] = falls {
+                change.acceleration = change.acceleration.max((one - other).amax());
+            }
             change.distance = change.distance.max((a.origin - b.origin).norm());
             // Of a small rotation the sine of its angle, from the part that is skew.
             let r = a.rotation.transpose() * b.rotation;
@@ -59,6 +65,17 @@ impl Change {
         }
         change
     }
+}
+
+/// How the arm begins to fall, M⁻¹·g; none where M is singular, as it is with links without mass.
+fn fall(matrix: &[Vec<f64>], weight: &[f64]) -> Option<SVector<f64, MAX_JOINTS>> {
+    // The largest arm's, padded with ones.
+    let entry = |i: usize, j: usize| matrix.get(i).and_then(|row| row.get(j)).copied();
+    let padded = SMatrix::<f64, MAX_JOINTS, MAX_JOINTS>::from_fn(|i, j| {
+        entry(i, j).unwrap_or(if i == j { 1.0 } else { 0.0 })
+    });
+    let weight = SVector::from_fn(|i, _| weight.get(i).copied().unwrap_or(0.0));
+    Some(padded.cholesky()?.solve(&weight))
 }
 
 fn within(joint: &ChainJoint, draws: &mut Draws) -> f64 {

@@ -204,22 +204,37 @@ fn meant(robot: &urdf::Robot, written: chain::Chain, options: &Options) -> Resul
     let (nearest, moved) = rounding::nearest(robot, &written.path);
     let mut chain = chain::chain(&nearest, options)?;
     if !moved.is_empty() {
-        let Change { distance, turn, inertia, torque } = Change::between(&written, &chain);
+        let change = Change::between(&written, &chain);
         chain.notes.extend(moved.into_iter().map(|joint| format!("taken as meant: {joint}")));
         chain.notes.push(format!(
-            "these numbers are rounded; taken as meant they move the tip by at most {} mm and {} mrad over \
-             the joints' ranges and change the torque that holds the arm still by at most {} N·m, M by at most {} % of \
-             √(M_ii M_jj) (--exact keeps every digit)",
-            short(1e3 * distance),
-            short(1e3 * turn),
-            short(torque),
-            short(100.0 * inertia)
+            "these numbers are rounded; taken as meant they {} over the joints' ranges (--exact keeps every digit)",
+            in_words(&change)
         ));
     }
     Ok(chain)
 }
 
+/// What changes, and by how much at most.
+fn in_words(change: &Change) -> String {
+    let Change { distance, turn, inertia, torque, acceleration } = *change;
+    let all = [
+        (1e3 * distance, "move the tip by at most", "mm"),
+        (1e3 * turn, "turn it by at most", "mrad"),
+        (torque, "change the torque that holds the arm still by at most", "N·m"),
+        (acceleration, "change how the arm falls from rest by at most", "rad/s² (m/s²)"),
+        (100.0 * inertia, "change M by at most", "% of √(M_ii M_jj)"),
+    ];
+    let changed = all.into_iter().filter(|(size, ..)| *size > 0.0);
+    let words: Vec<String> =
+        changed.map(|(size, what, unit)| format!("{what} {} {unit}", short(size))).collect();
+    if words.is_empty() {
+        "change nothing that torques or the tip show".to_string()
+    } else {
+        words.join(", ")
+    }
+}
+
 /// A size to three digits.
 fn short(x: f64) -> String {
-    if x == 0.0 || x >= 0.01 { format!("{x:.3}") } else { format!("{x:.2e}") }
+    if x >= 0.01 { format!("{x:.3}") } else { format!("{x:.2e}") }
 }

@@ -8,7 +8,7 @@ use crate::exact::prime::{Draws, Fp, PrimeField};
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::evaluate::sine_and_cosine;
-use crate::graph::{Input, evaluate};
+use crate::graph::{Expr, Input, evaluate};
 use crate::lagrangian::followers::{input_angles, with_theta};
 use crate::parameters::{Combination, ParameterSet};
 
@@ -203,6 +203,13 @@ impl<'a> Point<'a> {
 
     /// The function's graph at this point, with the set's sums of the parameter values.
     pub(super) fn evaluate(&self, set: &ParameterSet, function: &FunctionGraph) -> Option<Vec<Fp>> {
+        let nodes = self.nodes(set, function)?;
+        let of = |e: &Expr| nodes[e.node()].map(|x| if e.is_negative() { -x } else { x });
+        function.outputs.iter().map(of).collect()
+    }
+
+    /// As [`Self::evaluate`], the values of all nodes of the graph that the function needs.
+    pub(crate) fn nodes(&self, set: &ParameterSet, function: &FunctionGraph) -> Option<Vec<Option<Fp>>> {
         let sums = self.argument(set, Argument::Parameters);
         let torques = match function.function.takes(Argument::Torques) {
             true => self.seen_by(function.function).argument(set, Argument::Torques),
@@ -227,7 +234,7 @@ impl<'a> Point<'a> {
             Input::Prepared(_) => Fp::ZERO,
         };
         let symbol = |index, sine| self.sets.field.modular_symbol(index, sine);
-        evaluate::evaluate(&function.graph, &function.outputs, input, symbol)
+        evaluate::nodes(&function.graph, &function.outputs, input, symbol)
     }
 
     fn sum(&self, terms: &Combination) -> Fp {

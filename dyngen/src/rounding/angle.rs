@@ -46,6 +46,11 @@ impl Angle {
         Angle { terms, offset, of_offset }
     }
 
+    /// Each variable with its factor.
+    pub(super) fn factors(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.terms.iter().map(|term| (term.variable, term.factor))
+    }
+
     /// The range of its sine or cosine, and the error of the emitted one; `None` beyond [`LARGEST`].
     pub(super) fn turned(&self, sine: bool, ranges: &[Interval]) -> Option<(Interval, Errors)> {
         let mut angle = Interval::point(0.0);

@@ -34,9 +34,20 @@ impl Interval {
         self.high - self.low
     }
 
+    /// Halfway between the two.
+    pub(super) fn middle(self) -> f64 {
+        0.5 * self.low + 0.5 * self.high
+    }
+
+    /// Whether a number is in it.
+    #[cfg(test)]
+    pub(super) fn contains(self, x: f64) -> bool {
+        self.low <= x && x <= self.high
+    }
+
     /// The lower and the upper half.
     pub(super) fn halves(self) -> [Interval; 2] {
-        let middle = 0.5 * self.low + 0.5 * self.high;
+        let middle = self.middle();
         [Interval { high: middle, ..self }, Interval { low: middle, ..self }]
     }
 
@@ -54,6 +65,12 @@ impl Interval {
             low: if self.low < -most { -most } else { self.low },
             high: if self.high > most { most } else { self.high },
         }
+    }
+
+    /// What of it is in another one that holds the number too.
+    #[inline]
+    pub(super) fn within_range(self, other: Interval) -> Interval {
+        Interval { low: self.low.max(other.low), high: self.high.min(other.high) }
     }
 
     #[inline]

@@ -2,6 +2,7 @@
 
 use super::angle::Angle;
 use super::interval::Interval;
+use super::known::{Facts, Known};
 use super::norms::{self, Norm};
 use super::precision::{PRECISIONS, Precision};
 use super::slopes;
@@ -36,42 +37,28 @@ pub(super) enum Operation {
     Div(usize, usize),
 }
 
-/// One output as a program: the emitted operations, then those of the output's derivatives by what each of them rounds.
+/// What the emitted code of some outputs does, operation by operation.
 #[derive(Clone, Debug)]
-pub(super) struct Program {
-    /// The emitted operations stand first; the rest is computed here alone and rounds nothing.
-    operations: Vec<Operation>,
-    emitted: usize,
-    /// Of each emitted operation the derivative of the output by it.
-    slopes: Vec<Option<usize>>,
-    /// Better bounds for some operations.
-    norms: Vec<Option<Norm>>,
-    angles: Vec<(JointSum, Angle)>,
+pub(super) struct Emitted {
+    pub(super) operations: Vec<Operation>,
+    /// Of each operation its node in the function's graph.
+    pub(super) nodes: Vec<usize>,
+    pub(super) angles: Vec<(JointSum, Angle)>,
     /// What it reads.
     pub(super) variables: Vec<Variable>,
 }
 
-/// Intervals for [`Program::errors`], used again from call to call.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Workspace {
-    values: Vec<Interval>,
-    errors: Vec<Errors>,
-}
-
-impl Program {
-    /// That of an output; `None` where the function reads prepared parameters.
-    pub(super) fn new(model: &Model, built: &FunctionGraph, output: usize) -> Option<Program> {
-        let mut program = Program {
-            operations: Vec::new(),
-            emitted: 0,
-            slopes: Vec::new(),
-            norms: Vec::new(),
-            angles: Vec::new(),
-            variables: Vec::new(),
-        };
+impl Emitted {
+    /// `None` where the function reads prepared parameters.
+    pub(super) fn new(model: &Model, built: &FunctionGraph, outputs: &[Expr]) -> Option<Emitted> {
         let graph = &built.graph;
+        let nodes = graph.needed(outputs);
+        let (operations, angles, variables) = (Vec::new(), Vec::new(), Vec::new());
+        let mut emitted = Emitted { operations, nodes, angles, variables };
         let mut place = vec![0; graph.nodes().len()];
-        for node in graph.needed(&built.outputs[output..=output]) {
+        for k in 0..emitted.nodes.len() {
+            let node = emitted.nodes[k];
+            place[node] = k;
             let at = |e: Expr| place[e.node()];
             let operation = match graph.nodes()[node] {
                 Node::Constant(index) => {
@@ -80,25 +67,16 @@ impl Program {
                     Operation::Constant(Interval::point(rational::to_f64(exact)), errors)
                 }
                 Node::Symbol(index, sine) => symbol(model, index as usize, sine),
-                Node::Input(Input::Sin(sum)) => Operation::Sine(program.angle(model, sum)),
-                Node::Input(Input::Cos(sum)) => Operation::Cosine(program.angle(model, sum)),
-                Node::Input(input) => Operation::Variable(program.variable(variable(input)?)),
+                Node::Input(Input::Sin(sum)) => Operation::Sine(emitted.angle(model, sum)),
+                Node::Input(Input::Cos(sum)) => Operation::Cosine(emitted.angle(model, sum)),
+                Node::Input(input) => Operation::Variable(emitted.variable(variable(input)?)),
                 Node::Add(a, b) => Operation::Add(at(a), at(b), b.is_negative()),
                 Node::Mul(a, b) => Operation::Mul(at(a), at(b)),
                 Node::Div(a, b) => Operation::Div(at(a), at(b)),
             };
-            program.operations.push(operation);
-            place[node] = program.operations.len() - 1;
+            emitted.operations.push(operation);
         }
-        program.emitted = program.operations.len();
-        program.slopes = slopes::append(&mut program.operations);
-        program.norms = norms::of(&program.operations);
-        Some(program)
-    }
-
-    /// How many operations it is.
-    pub(super) fn len(&self) -> usize {
-        self.operations.len()
+        Some(emitted)
     }
 
     fn variable(&mut self, variable: Variable) -> usize {
@@ -117,6 +95,58 @@ impl Program {
         self.angles.push((sum, angle));
         self.angles.len() - 1
     }
+}
+
+/// One output as a program: the emitted operations, then those of the output's derivatives by what each of them rounds.
+#[derive(Clone, Debug)]
+pub(super) struct Program {
+    /// The emitted operations stand first; the rest is computed here alone and rounds nothing.
+    pub(super) operations: Vec<Operation>,
+    pub(super) emitted: usize,
+    /// Of each emitted operation the derivative of the output by it.
+    pub(super) slopes: Vec<Option<usize>>,
+    /// Better bounds for some operations.
+    pub(super) norms: Vec<Option<Norm>>,
+    /// What is known of some where B is divided by.
+    known: Option<Vec<Option<Known>>>,
+    pub(super) angles: Vec<(JointSum, Angle)>,
+    /// What it reads.
+    pub(super) variables: Vec<Variable>,
+}
+
+/// Intervals for [`Program::errors`], used again from call to call.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Workspace {
+    pub(super) values: Vec<Interval>,
+    pub(super) errors: Vec<Errors>,
+    /// How far the emitted value is from the exact one.
+    pub(super) deviations: Vec<Errors>,
+}
+
+impl Program {
+    /// That of an output; `None` where the function reads prepared parameters.
+    pub(super) fn new(
+        model: &Model,
+        built: &FunctionGraph,
+        output: usize,
+        facts: Option<&Facts>,
+    ) -> Option<Program> {
+        let Emitted { mut operations, nodes, angles, variables } =
+            Emitted::new(model, built, &built.outputs[output..=output])?;
+        let emitted = operations.len();
+        let slopes = slopes::append(&mut operations);
+        let norms = norms::of(&operations);
+        let known = match facts {
+            Some(facts) => Some(facts.of(&operations, &nodes)?),
+            None => None,
+        };
+        Some(Program { operations, emitted, slopes, norms, known, angles, variables })
+    }
+
+    /// How many operations it is.
+    pub(super) fn len(&self) -> usize {
+        self.operations.len()
+    }
 
     /// The most by which the emitted output may be off where each variable lies in its range; infinite where a divisor
     /// may be zero or a value is too large for `f32`.
@@ -125,6 +155,9 @@ impl Program {
     /// By the mean value theorem the two differ by Σ ∂out/∂δᵢ·δᵢ, with the derivatives at some t·δ, 0 ≤ t ≤ 1. The
     /// intervals hold the values of all operations for all such t, so nothing of second order is left out.
     pub(super) fn errors(&self, ranges: &[Interval], workspace: &mut Workspace) -> Errors {
+        if let Some(known) = &self.known {
+            return self.errors_from_exact(known, ranges, workspace).unwrap_or([f64::INFINITY; 2]);
+        }
         if self.evaluate(ranges, workspace).is_none() {
             return [f64::INFINITY; 2];
         }
@@ -142,7 +175,7 @@ impl Program {
 
     /// The values of all operations with what may have been rounded in them, and how much each emitted one rounds.
     fn evaluate(&self, ranges: &[Interval], workspace: &mut Workspace) -> Option<()> {
-        let Workspace { values, errors } = workspace;
+        let Workspace { values, errors, .. } = workspace;
         values.clear();
         errors.clear();
         for (k, operation) in self.operations.iter().enumerate() {
@@ -178,7 +211,7 @@ impl Program {
     }
 
     /// Whether products with it only change exponents.
-    fn is_power_of_two(&self, operation: usize) -> bool {
+    pub(super) fn is_power_of_two(&self, operation: usize) -> bool {
         matches!(&self.operations[operation], Operation::Constant(x, _) if x.low.to_bits() << 12 == 0)
     }
 }
@@ -224,7 +257,7 @@ pub(super) fn variable(input: Input) -> Option<Variable> {
 const DOUBLE_BY_SINGLE: f64 = Precision::Double.unit() / Precision::Single.unit();
 
 /// Of what rounds nothing.
-const EXACT: Errors = [0.0; 2];
+pub(super) const EXACT: Errors = [0.0; 2];
 
 /// What an operation rounds that is exact but for subnormal results.
-const TINY: Errors = [f32::MIN_POSITIVE as f64 * f32::EPSILON as f64, f64::MIN_POSITIVE];
+pub(super) const TINY: Errors = [f32::MIN_POSITIVE as f64 * f32::EPSILON as f64, f64::MIN_POSITIVE];

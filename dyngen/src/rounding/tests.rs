@@ -4,7 +4,10 @@
 
 mod twice;
 
-use super::{Bounds, bounds};
+use super::factors::MassMatrix;
+use super::interval::Interval;
+use super::limits::Limits;
+use super::{Bounder, Bounds, Divisor, bounds, divisor};
 use crate::arm::Arm;
 use crate::dynamics::function::Argument;
 use crate::dynamics::{Function, FunctionGraph};
@@ -16,7 +19,7 @@ use crate::model::Model;
 use crate::parameters::SetKind;
 use crate::values::Values;
 use chacha20::ChaCha8Rng;
-use nalgebra::{RealField, convert};
+use nalgebra::{RealField, SMatrix, convert};
 use rand::{RngExt, SeedableRng};
 use std::time::Instant;
 use twice::Twice;
@@ -171,8 +174,13 @@ struct Seen {
 
 impl Seen {
     /// `exact` of the samples are evaluated with twice the digits too.
-    fn of(model: &Model, values: &[f64], built: &FunctionGraph, samples: usize, exact: usize) -> Seen {
-        let bounds = bounds(model, built, Some(values)).unwrap();
+    fn of(
+        model: &Model,
+        values: &[f64],
+        (built, bounds): (&FunctionGraph, Bounds),
+        samples: usize,
+        exact: usize,
+    ) -> Seen {
         // What both formats are given.
         let parameters: Vec<f64> = values.iter().map(|x| f64::from(*x as f32)).collect();
         let mut rng = ChaCha8Rng::seed_from_u64(7);
@@ -210,14 +218,20 @@ fn most(all: &[f64]) -> f64 {
 #[test]
 fn no_state_of_the_lwa_4p_is_further_off_than_its_bound() {
     let (model, values) = lwa4p();
+    let bounder = Bounder::new(&model, Some(&values));
     for function in model.functions(SetKind::Minimal) {
         let built = model.function(function, SetKind::Minimal).unwrap();
-        let seen = Seen::of(&model, &values, &built, 200, 50);
-        // A bound that holds for everything says nothing: those of the common functions without divisions are near what
-        // is seen, but of accelerations of points intervals know less.
+        let Ok(bounds) = bounder.bounds(&built) else {
+            let without = [Divisor::Task, Divisor::Loaded].map(Some);
+            assert!(without.contains(&divisor(function)), "{function} has no bound");
+            continue;
+        };
+        let seen = Seen::of(&model, &values, (&built, bounds), 200, 50);
+        // A bound that holds for everything says nothing: those of the common functions are near what is seen, but of
+        // accelerations of points intervals know less.
         let loose = function == Function::JacobianRateTimesVelocity;
         let is_common = Function::common().any(|common| common == function);
-        if is_common && built.graph.operations(&built.outputs).div == 0 {
+        if is_common || function == Function::TaskInertiaInverse {
             let worst = [
                 most(&seen.bounds.single) / most(&seen.single),
                 most(&seen.bounds.double) / most(&seen.double),
@@ -275,24 +289,98 @@ fn a_limit_that_the_file_lacks_is_named() {
     assert!(of(Function::Gravity).is_ok());
 }
 
+/// The inverse of the last rows and columns from `first` on, where they stand.
+fn inverse_from(b: &SMatrix<f64, 6, 6>, first: usize) -> SMatrix<f64, 6, 6> {
+    let one = SMatrix::<f64, 6, 6>::identity();
+    let block = SMatrix::<f64, 6, 6>::from_fn(|i, j| if i.min(j) >= first { b[(i, j)] } else { one[(i, j)] });
+    block.try_inverse().unwrap()
+}
+
+/// Entries of B⁻¹, L and D are in their ranges at poses of the whole range and of its corners.
 #[test]
-#[ignore = "minutes: cargo test --release -p dyngen --lib rounding -- --ignored --nocapture"]
+fn ranges_of_factors_hold_every_pose() {
+    let (model, values) = lwa4p();
+    let built = model.function(Function::MassMatrix, SetKind::Minimal).unwrap();
+    let mass = MassMatrix::new(&model, &built, &Limits::new(model.arm(), Some(&values))).unwrap();
+    let factors = mass.factors(0.5, 100_000).unwrap();
+    let n = factors.n;
+    let mut matrices = Emitted::<f64>::new(&model, &built);
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    // How near to its end each range is reached: ranges that hold everything would say nothing.
+    let mut reached = 0.0f64;
+    for _ in 0..5_000 {
+        let state = State::draw(model.arm(), &values, &mut rng);
+        let b = SMatrix::<f64, 6, 6>::from_row_slice(&matrices.run(&state));
+        let inverse = inverse_from(&b, 0);
+        let inside = |x: f64, range: Interval| range.widened(1e-9 * x.abs().max(1.0)).contains(x);
+        for k in 0..n * n {
+            assert!(inside(inverse[(k / n, k % n)], factors.inverse[k]), "B⁻¹ {k}");
+        }
+        reached = reached.max(inverse[(0, 0)] / factors.inverse[0].high);
+        // Pivots from the last joint inwards: 1/d is the first entry of the inverse of what is left.
+        for i in 0..n {
+            let outer = inverse_from(&b, i);
+            assert!(inside(1.0 / outer[(i, i)], factors.pivots[i]), "d {i}");
+            for j in 0..i {
+                let l = (i..n).map(|c| outer[(i, c)] * b[(c, j)]).sum::<f64>();
+                assert!(inside(l, factors.lower[i * n + j]), "L {i} {j}");
+                // The outer joints follow when j accelerates: column j of L⁻¹.
+                let freed = inverse_from(&b, j + 1);
+                let l = -(j + 1..n).map(|c| freed[(i, c)] * b[(c, j)]).sum::<f64>();
+                assert!(inside(l, factors.lower_inverse[i * n + j]), "L⁻¹ {i} {j}");
+            }
+        }
+    }
+    assert!(reached > 0.3, "{reached}");
+}
+
+#[test]
+fn an_arm_whose_mass_matrix_is_not_positive_is_named_with_a_pose() {
+    let (model, mut values) = lwa4p();
+    let of = |values: Option<&[f64]>, function| {
+        bounds(&model, &model.function(function, SetKind::Minimal).unwrap(), values)
+    };
+    assert!(of(None, Function::ForwardDynamics).unwrap_err().contains("--values"));
+    let task = of(Some(&values), Function::TaskInertia).unwrap_err();
+    assert!(task.contains("rank six") && task.contains("at q = ["), "{task}");
+    // Less than the first joint's inertia when the arm points upwards.
+    values[0] -= 1.2;
+    let negative = of(Some(&values), Function::ForwardDynamics).unwrap_err();
+    assert!(negative.contains("not positive definite") && negative.contains("at q = ["), "{negative}");
+}
+
+#[test]
+#[ignore = "at_length minutes: cargo test --release -p dyngen --lib rounding -- --ignored --nocapture"]
 fn no_state_of_a_million_is_further_off_than_its_bound() {
+    compare_at_length(|function| divisor(function).is_none());
+}
+
+#[test]
+#[ignore = "at_length minutes: cargo test --release -p dyngen --lib rounding -- --ignored --nocapture"]
+fn no_acceleration_of_a_million_is_further_off_than_its_bound() {
+    compare_at_length(|function| divisor(function).is_some());
+}
+
+fn compare_at_length(wanted: impl Fn(Function) -> bool) {
     let (model, values) = lwa4p();
     println!(
         "function, time, bound in f32; then of f32 and of f64 the bound / the worst error that was seen: of the"
     );
     println!("worst entry, and the largest of all entries");
-    for function in model.functions(SetKind::Minimal) {
+    let bounder = Bounder::new(&model, Some(&values));
+    for function in model.functions(SetKind::Minimal).filter(|f| wanted(*f)) {
         let built = model.function(function, SetKind::Minimal).unwrap();
         let start = Instant::now();
-        let found = bounds(&model, &built, Some(&values)).unwrap();
+        let found = bounder.bounds(&built);
         let seconds = start.elapsed().as_secs_f64();
-        if found.single.iter().any(|x| x.is_infinite()) {
-            println!("{:36} {seconds:6.2} s  no bound", function.name());
-            continue;
-        }
-        let seen = Seen::of(&model, &values, &built, 1_000_000, 20_000);
+        let found = match found {
+            Ok(found) => found,
+            Err(why) => {
+                println!("{:36} {seconds:6.2} s  no bound: {why}", function.name());
+                continue;
+            }
+        };
+        let seen = Seen::of(&model, &values, (&built, found), 1_000_000, 20_000);
         let Seen { bounds, single, double } = &seen;
         let of = |bounds: &[f64], seen: &[f64]| {
             let ratios = Seen::ratios(bounds, seen);

@@ -35,6 +35,7 @@ pub mod explain;
 pub mod fmu;
 mod options;
 mod rule;
+pub mod servo;
 pub mod simulate;
 pub mod torque_model;
 pub mod watch;

@@ -11,6 +11,7 @@ mod known;
 pub mod mounting;
 mod nearest;
 mod numeric_arm;
+pub mod servo;
 mod source;
 pub mod transmission;
 pub mod usable;

@@ -6,7 +6,7 @@
 use super::conventions::Conventions;
 use dyngen::Arm;
 use powerball_controller::JointNumber;
-use powerball_logs::log::Log;
+use powerball_logs::log::{Doubt, Log, ServoLog};
 
 /// The data that the conditions of a usable result need.
 #[derive(Clone, Debug, Default)]
@@ -73,8 +73,17 @@ impl Findings<'_> {
 
 /// Reasons in the logs and the arm themselves not to use them, each once: a sentence without its full stop.
 pub(crate) fn doubts<'l>(arm: &Arm, logs: impl IntoIterator<Item = &'l Log>) -> Vec<String> {
+    each_once(arm, logs.into_iter().flat_map(|log| &log.doubts))
+}
+
+/// As [`doubts`], of logs of position servos.
+pub fn servo_doubts<'l>(arm: &Arm, logs: impl IntoIterator<Item = &'l ServoLog>) -> Vec<String> {
+    each_once(arm, logs.into_iter().flat_map(|log| &log.doubts))
+}
+
+fn each_once<'l>(arm: &Arm, doubts: impl Iterator<Item = &'l Doubt>) -> Vec<String> {
     let mut all = arm.doubts();
-    for doubt in logs.into_iter().flat_map(|log| &log.doubts) {
+    for doubt in doubts {
         let sentence = doubt.sentence.trim_end_matches('.').to_string();
         if !all.contains(&sentence) {
             all.push(sentence);

@@ -35,6 +35,7 @@ mod live;
 pub mod load;
 mod page;
 pub mod sections;
+pub mod servos;
 pub mod verified;
 
 pub use bars::BarPairs;

@@ -120,11 +120,28 @@ impl Log {
         columns: &[(String, &[f64])],
         map: &ColumnMap,
     ) -> Result<(Log, Vec<Finding>), LogError> {
+        let mut findings = Vec::new();
+        let asked = Asked { arm, map, file: name, header: Some(1), goals: false };
+        let log = Samples::of_columns(asked, columns, &mut findings)?.finish(false)?;
+        Ok((log, findings))
+    }
+}
+
+impl<'a> Samples<'a> {
+    /// The samples of columns in memory.
+    ///
+    /// # Errors
+    /// Columns of unlike length, and why such columns are of no use.
+    pub(super) fn of_columns(
+        asked: Asked<'a>,
+        columns: &[(String, &[f64])],
+        findings: &'a mut Vec<Finding>,
+    ) -> Result<Samples<'a>, LogError> {
         let times = columns.iter().find(|(column, _)| column == "t").map_or(0, |(_, t)| t.len());
         let unlike = columns.iter().filter(|(_, values)| values.len() != times);
         let unlike: Vec<Finding> = unlike
             .map(|(column, values)| Finding {
-                file: name.to_string(),
+                file: asked.file.to_string(),
                 line: None,
                 quantity: column.clone(),
                 message: format!("has {} values for {times} times t: give one for each", values.len()),
@@ -134,15 +151,12 @@ impl Log {
             return Err(LogError(unlike));
         }
         let names: Vec<String> = columns.iter().map(|(column, _)| column.clone()).collect();
-        let mut findings = Vec::new();
-        let asked = Asked { arm, map, file: name, header: Some(1) };
-        let mut samples = Samples::new(asked, "sample", &mut findings);
+        let mut samples = Samples::new(asked, "sample", findings);
         samples.begin(&names)?;
         samples.expect(times);
         for k in 0..times {
             samples.row(k + 1, &|column| columns.get(column)?.1.get(k).copied());
         }
-        let log = samples.finish(false)?;
-        Ok((log, findings))
+        Ok(samples)
     }
 }

@@ -1,12 +1,13 @@
 //! What can be wrong with numbers that are there: time, wraps, units, dead and saturated signals.
 
 use super::map::{SLOWEST, time_unit};
-use super::read::{Effort, Raw};
+use super::read::{Effort, GOAL, Raw};
 use super::{Doubt, Finding, Log, LogError, Motors, Severity, Warnings, outliers, signal_checks};
 use crate::signal::resample::median_step;
 use dyngen::Arm;
 use dyngen::arm::JointKind;
 use std::f64::consts::PI;
+use std::mem::take;
 use std::ops::Range;
 
 /// A step between samples longer than this, s, or than [`GAP_STEPS`] median steps, is a gap.
@@ -23,33 +24,33 @@ const ABSURD: f64 = 3.0;
 
 /// The log of samples that were read; what is odd about them is added to `findings`.
 pub(super) fn into_log(
-    mut raw: Raw,
+    raw: &mut Raw,
     effort: &Effort,
     file: &str,
     arm: &Arm,
     findings: &mut Vec<Finding>,
 ) -> Result<Log, LogError> {
-    let restarts = join_restarts(&mut raw, file, findings);
-    drop_stale(&mut raw, file, findings)?;
-    let step = sound_step(&raw, file, findings)?;
-    outliers::leave_out(&mut raw, effort, (arm, file), findings);
-    let doubts = check_signals(&mut raw, effort, step, file, arm, findings)?;
-    let pieces = pieces(&raw, step, &restarts, (arm, file), findings);
+    let restarts = join_restarts(raw, file, findings);
+    drop_stale(raw, file, findings)?;
+    let step = sound_step(raw, file, findings)?;
+    outliers::leave_out(raw, effort, (arm, file), findings);
+    let doubts = check_signals(raw, effort, step, file, arm, findings)?;
+    let pieces = pieces(raw, step, &restarts, (arm, file), findings);
     let torque = match effort {
-        Effort::Torque => raw.effort,
+        Effort::Torque | Effort::Goal => take(&mut raw.effort),
         Effort::Current(constants) => {
             let scaled = |(x, c): (Vec<f64>, &f64)| x.into_iter().map(|i| i * c).collect();
-            of_motors(arm, raw.effort.into_iter().zip(constants).map(scaled).collect())
+            of_motors(arm, take(&mut raw.effort).into_iter().zip(constants).map(scaled).collect())
         }
     };
-    let temperature = raw.temperature.filter(|t| t.iter().flatten().all(|v| v.is_finite()));
+    let temperature = raw.temperature.take().filter(|t| t.iter().flatten().all(|v| v.is_finite()));
     Ok(Log {
         file: file.to_string(),
-        t: raw.t,
-        q: raw.q,
+        t: take(&mut raw.t),
+        q: take(&mut raw.q),
         torque,
         temperature,
-        motor: raw.motor,
+        motor: raw.motor.take(),
         pieces,
         doubts,
         clock: 0.0,
@@ -157,15 +158,19 @@ fn check_signals(
         units(raw, j, effort, arm, file, findings, &mut errors);
     }
     let mut errors = one_a_quantity(errors);
-    let name = if matches!(effort, Effort::Torque) { "tau" } else { "i" };
+    let name = effort.name();
     let mut warnings = Warnings { file, line: &raw.line, t: &raw.t, findings, errors: &mut errors };
     for (j, (q, effort)) in raw.q.iter().zip(&raw.effort).enumerate() {
-        signal_checks::effort(effort, &format!("{name}{}", j + 1), &mut warnings);
-        signal_checks::steps(effort, &format!("{name}{}", j + 1), false, &mut warnings);
+        if name != GOAL {
+            signal_checks::effort(effort, &format!("{name}{}", j + 1), &mut warnings);
+            signal_checks::steps(effort, &format!("{name}{}", j + 1), false, &mut warnings);
+        }
         signal_checks::steps(q, &format!("q{}", j + 1), true, &mut warnings);
     }
     let doubts = signal_checks::velocities(raw, step, &mut warnings);
-    signal_checks::torque_signs(raw, step, name, &mut warnings);
+    if name != GOAL {
+        signal_checks::torque_signs(raw, step, name, &mut warnings);
+    }
     rate(&raw.t, &mut warnings);
     if errors.is_empty() { Ok(doubts) } else { Err(LogError(errors)) }
 }

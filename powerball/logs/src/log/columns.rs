@@ -15,19 +15,34 @@ pub(super) struct Asked<'a> {
     pub file: &'a str,
     /// The line of the header, where the file has one.
     pub header: Option<usize>,
+    /// Whether it is read for position servos: set-points take the place of torques.
+    pub goals: bool,
+}
+
+impl Asked<'_> {
+    /// What stands in the place of torques.
+    pub(super) fn efforts(&self) -> &'static [&'static str] {
+        if self.goals { &["goal"] } else { &["tau", "i"] }
+    }
 }
 
 /// What LeRobot calls an arm's positions.
 const LEROBOT: &str = "observation.state";
 /// The quantities with the names that columns have for them: those of this project's own logs, of ROS and of LeRobot.
-const NAMES: [(&str, &[&str]); 6] = [
+const NAMES: [(&str, &[&str]); 10] = [
     ("q", &["q", "position", LEROBOT]),
     ("dq", &["dq", "velocity", "observation.velocity"]),
     ("tau", &["tau", "effort", "observation.effort"]),
     ("i", &["i", "current", "observation.current"]),
     ("temp", &["temp", "temperature"]),
     ("motor", &["motor"]),
+    ("goal", &["goal", "action"]),
+    ("volts", &["volts", "voltage"]),
+    ("load", &["load"]),
+    ("torque_enable", &["torque_enable"]),
 ];
+/// What the logs of position servos may hold in addition.
+pub(super) const OF_SERVOS: [&str; 3] = ["volts", "load", "torque_enable"];
 /// The names in recordings of Universal Robots' RTDE, which count joints from 0; the torques by current are
 /// those that controllers from 5.23 on give.
 const RTDE: [(&str, &str); 5] = [
@@ -45,7 +60,8 @@ const UNIT_OF_LEROBOT: &str = "LeRobot does not say in which unit observation.st
     servo's range, or a share of that range from -100 to 100. Say it with --map 'q.unit = \"deg\"' (or \"rad\"); a share of \
     the range is no angle before it is multiplied by the range ('q.scale = […]')";
 const TORQUE_OF_LEROBOT: &str = ". LeRobot records torques or currents only where the robot was made to give them: name \
-    their column with --map 'tau.column = \"…\"' or 'i.column = \"…\"'; `action` is a set-point";
+    their column with --map 'tau.column = \"…\"' or 'i.column = \"…\"'; `action` is a set-point, and without torques \
+    `identify` and `explain` take the joints for position servos";
 
 /// The columns of one quantity by joint, and what each is to be multiplied with.
 pub(super) struct Group {
@@ -182,7 +198,8 @@ pub(super) fn group(names: &[String], key: &str, asked: Asked<'_>) -> Result<Gro
     if !missing.is_empty() {
         return Err(missing);
     }
-    let factor = (0..n).map(|j| mapped.factor(key, j)).collect();
+    let scaled = if key == "goal" && mapped.is_plain() { &asked.map.q } else { mapped };
+    let factor = (0..n).map(|j| scaled.factor(key, j)).collect();
     Ok(Group { at: found.into_iter().flatten().collect(), factor })
 }
 
@@ -196,6 +213,8 @@ pub(super) struct Columns {
     /// dq, used for checks alone.
     dq: Option<Group>,
     pub(super) motor: Option<Group>,
+    /// Those of [`OF_SERVOS`], where they are read.
+    pub(super) of_servos: Vec<Option<Group>>,
 }
 
 impl Columns {
@@ -243,6 +262,13 @@ impl Columns {
         }
         let (mut effort, mut torque) = (Effort::Torque, None);
         match (group(names, "tau", asked), group(names, "i", asked)) {
+            _ if asked.goals => {
+                effort = Effort::Goal;
+                match group(names, "goal", asked) {
+                    Ok(goal) => torque = Some(goal),
+                    Err(missing) => errors.push(finding("goal", missing_goals(&missing, n))),
+                }
+            }
             (Ok(tau), _) => torque = Some(tau),
             (Err(_), Ok(current)) => match constants(asked.arm) {
                 Ok(constants) => {
@@ -260,8 +286,9 @@ impl Columns {
                     "tau",
                     format!(
                         "a log needs tau1 … tau{n} [N·m] or i1 … i{n} [A] for each of \
-                the {n} joints; missing: {}{hint}",
-                        missing.join(", ")
+                the {n} joints; missing: {}{hint}{}",
+                        missing.join(", "),
+                        if group(names, "goal", asked).is_ok() { GOALS_ALONE } else { "" }
                     ),
                 ));
             }
@@ -283,7 +310,8 @@ impl Columns {
             effort,
             temperature: optional("temp"),
             dq: optional("dq"),
-            motor: optional("motor"),
+            motor: optional("motor").filter(|_| !asked.goals),
+            of_servos: OF_SERVOS.map(|key| optional(key).filter(|_| asked.goals)).into(),
         };
         if let Some(motor) = &columns.motor {
             let shown: Vec<&str> = motor.at.iter().map(|k| names[*k].as_str()).collect();
@@ -304,12 +332,13 @@ impl Columns {
     }
 
     fn groups(&self) -> impl Iterator<Item = &Group> {
-        let optional = [&self.temperature, &self.dq, &self.motor].into_iter().flatten();
+        let optional =
+            [&self.temperature, &self.dq, &self.motor].into_iter().chain(&self.of_servos).flatten();
         [&self.t, &self.q, &self.torque].into_iter().chain(optional)
     }
 
-    /// t, q, effort, temperature, motor, dq in a row; one of the last three that is no number does not spoil
-    /// the sample.
+    /// t, q, effort, temperature, motor, those of servos, dq in a row; one of the last four that is no number does not
+    /// spoil the sample.
     pub(super) fn sample(&self, number: &impl Fn(usize) -> Option<f64>) -> Option<Vec<f64>> {
         let mut values = Vec::new();
         for group in [&self.t, &self.q, &self.torque] {
@@ -317,7 +346,8 @@ impl Columns {
                 values.push(value?);
             }
         }
-        for group in [&self.temperature, &self.motor, &self.dq].into_iter().flatten() {
+        let optional = [&self.temperature, &self.motor].into_iter().chain(&self.of_servos).chain([&self.dq]);
+        for group in optional.flatten() {
             values.extend(group.values(number).map(|value| value.unwrap_or(f64::NAN)));
         }
         Some(values)
@@ -338,6 +368,7 @@ impl Columns {
         raw.effort = self.torque.take(values, uses);
         let mut optional = |group: &Option<Group>| group.as_ref().map(|group| group.take(values, uses));
         (raw.temperature, raw.motor) = (optional(&self.temperature), optional(&self.motor));
+        raw.of_servos = self.of_servos.iter().map(&mut optional).collect();
         raw.dq = optional(&self.dq).unwrap_or_else(|| vec![Vec::new(); raw.q.len()]);
     }
 
@@ -360,6 +391,18 @@ impl Columns {
             .and_then(|k| names.get(*k).cloned())
             .unwrap_or_else(|| "line".into())
     }
+}
+
+/// What to do with set-points where torques are needed.
+const GOALS_ALONE: &str =
+    "; set-points (goal1 …) are there: `identify` and `explain` take such joints for position servos";
+
+fn missing_goals(missing: &[String], n: usize) -> String {
+    format!(
+        "the log of position servos needs their set-points goal1 … goal{n} [rad or m] for each of the {n} joints (or torques, \
+         tau1 … tau{n}); missing: {}",
+        missing.join(", ")
+    )
 }
 
 fn one_too_many_message(more: &str, n: usize) -> String {
@@ -404,7 +447,7 @@ fn time(names: &[String], asked: Asked<'_>) -> Option<Group> {
 }
 
 /// N·m/A by joint.
-fn constants(arm: &Arm) -> Result<Vec<f64>, String> {
+pub(super) fn constants(arm: &Arm) -> Result<Vec<f64>, String> {
     let n = arm.dof();
     let lacks = |j: &usize| arm.joints[j - 1].torque_constant.is_none();
     let without: Vec<String> = (1..=n).filter(lacks).map(|j| j.to_string()).collect();

@@ -34,6 +34,8 @@ const OTHERS: &[&str] = &[
     "min",
     "max",
     "limit",
+    "enable",
+    "enabled",
     "acc",
     "acceleration",
     "ddq",

@@ -57,7 +57,7 @@ impl LiveRows {
     /// Why such rows are of no use: missing columns, more joints than the arm has, no torque constant.
     pub fn new(name: &str, arm: &Arm, names: &[String], map: &ColumnMap) -> Result<LiveRows, LogError> {
         let mut findings: Vec<Finding> = Vec::new();
-        let asked = Asked { arm, map, file: name, header: Some(1) };
+        let asked = Asked { arm, map, file: name, header: Some(1), goals: false };
         Ok(LiveRows {
             columns: Columns::find(names, asked, &mut findings)?,
             motors: Motors::of(arm),

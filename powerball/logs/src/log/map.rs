@@ -43,6 +43,14 @@ pub struct ColumnMap {
     pub temp: Mapped,
     /// Torques on the motors' side.
     pub motor: Mapped,
+    /// Set-points of position servos; unit, sign and scale are those of `q` where it gives none.
+    pub goal: Mapped,
+    /// Voltages of position servos.
+    pub volts: Mapped,
+    /// Loads as position servos report them.
+    pub load: Mapped,
+    /// Whether a position servo is switched on: 0 or 1.
+    pub torque_enable: Mapped,
 }
 
 /// Which time of a message counts.
@@ -125,13 +133,14 @@ const TORQUES: &[Unit] = &[
 ];
 const CURRENTS: &[Unit] = &[(&["A"], 1.0), (&["mA"], 1e-3)];
 const TEMPERATURES: &[Unit] = &[(&["°C", "C", "degC"], 1.0)];
+const VOLTAGES: &[Unit] = &[(&["V"], 1.0), (&["mV"], 1e-3), (&["dV", "0.1 V"], 0.1)];
 
 impl ColumnMap {
     /// The topics that the map names, where it names the one with all other columns.
     pub(super) fn topics(&self) -> Option<Vec<String>> {
         let main = self.topic.clone()?;
-        let others = [&self.t, &self.q, &self.dq, &self.tau, &self.i, &self.temp, &self.motor];
-        Some(std::iter::once(main).chain(others.iter().filter_map(|own| own.topic.clone())).collect())
+        let others = self.quantities().into_iter().filter_map(|(_, own)| own.topic.clone());
+        Some(std::iter::once(main).chain(others).collect())
     }
 
     /// Reads a map from TOML; `name` stands in messages where the file does.
@@ -178,7 +187,7 @@ impl ColumnMap {
     }
 
     /// The quantities under their names.
-    pub(super) fn quantities(&self) -> [(&'static str, &Mapped); 7] {
+    pub(super) fn quantities(&self) -> [(&'static str, &Mapped); 11] {
         [
             ("t", &self.t),
             ("q", &self.q),
@@ -187,6 +196,10 @@ impl ColumnMap {
             ("i", &self.i),
             ("temp", &self.temp),
             ("motor", &self.motor),
+            ("goal", &self.goal),
+            ("volts", &self.volts),
+            ("load", &self.load),
+            ("torque_enable", &self.torque_enable),
         ]
     }
 
@@ -202,6 +215,10 @@ impl ColumnMap {
             "i" => &mut self.i,
             "temp" => &mut self.temp,
             "motor" => &mut self.motor,
+            "goal" => &mut self.goal,
+            "volts" => &mut self.volts,
+            "load" => &mut self.load,
+            "torque_enable" => &mut self.torque_enable,
             _ => &mut self.t,
         }
     }
@@ -209,9 +226,8 @@ impl ColumnMap {
     /// This map for columns that already have their plain names: units and signs alone.
     pub(super) fn without_columns(&self) -> ColumnMap {
         let mut map = self.clone();
-        for mapped in
-            [&mut map.t, &mut map.q, &mut map.dq, &mut map.tau, &mut map.i, &mut map.temp, &mut map.motor]
-        {
+        for (key, _) in self.quantities() {
+            let mapped = map.of_mut(key);
             (mapped.column, mapped.topic) = (None, None);
         }
         map
@@ -239,12 +255,13 @@ pub(super) const SLOWEST: f64 = 0.5;
 fn units(key: &str) -> &'static [Unit] {
     match key {
         "t" => TIMES,
-        "q" => POSITIONS,
+        "q" | "goal" => POSITIONS,
         "dq" => VELOCITIES,
         "tau" => TORQUES,
         "i" => CURRENTS,
         "temp" => TEMPERATURES,
-        // On the motors' side units are anybody's.
+        "volts" => VOLTAGES,
+        // On the motors' side units are anybody's, and loads are shares of whatever the drive takes for the most.
         _ => &[],
     }
 }
@@ -285,6 +302,11 @@ impl Mapped {
     /// The shift of a joint's column, s.
     pub(super) fn shift_of(&self, joint: usize) -> f64 {
         self.shift.as_ref().and_then(|by| by.of(joint)).copied().unwrap_or(0.0)
+    }
+
+    /// Whether it gives neither unit nor sign nor scale.
+    pub(super) fn is_plain(&self) -> bool {
+        self.unit.is_none() && self.sign.is_none() && self.scale.is_none()
     }
 
     /// What the column of a joint is to be multiplied with.

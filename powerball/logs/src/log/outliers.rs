@@ -4,7 +4,7 @@
 //! it is.
 
 use super::Finding;
-use super::read::{Effort, Raw};
+use super::read::{Effort, GOAL, Raw};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
 use std::f64::consts::TAU;
@@ -26,16 +26,17 @@ pub(super) fn leave_out(
     (arm, file): (&Arm, &str),
     findings: &mut Vec<Finding>,
 ) {
-    let name = if matches!(effort, Effort::Torque) { "tau" } else { "i" };
+    let name = effort.name();
     let mut keep = vec![true; raw.t.len()];
     for j in 0..arm.dof() {
         let limit = match (effort, arm.joints[j].torque) {
             (Effort::Current(constants), Some(limit)) => Some(limit / constants[j].abs()),
             (Effort::Torque, limit) => limit,
-            (Effort::Current(_), None) => None,
+            (Effort::Current(_) | Effort::Goal, _) => None,
         };
         let positions = jumps(raw, j, arm);
-        let torques = far(&raw.effort[j], limit);
+        // A set-point may step as it likes.
+        let torques = if name == GOAL { Vec::new() } else { far(&raw.effort[j], limit) };
         for (quantity, values, found) in [
             (format!("q{}", j + 1), &raw.q[j], positions),
             (format!("{name}{}", j + 1), &raw.effort[j], torques),

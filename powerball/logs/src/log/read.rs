@@ -8,6 +8,7 @@ use super::{Finding, Log, LogError, check, topics};
 use crate::tables::{Format, Place, RowSink, Table, columnar, make_room, read_dataset, read_topics, text};
 use dyngen::Arm;
 use std::fs::File;
+#[cfg(test)]
 use std::io::Read;
 use std::path::Path;
 
@@ -57,57 +58,83 @@ pub fn read_log_as(
     findings: &mut Vec<Finding>,
 ) -> Result<Log, LogError> {
     let file = path.display().to_string();
-    let asked = Asked { arm, map, file: &file, header: None };
+    read_asked(path, Asked { arm, map, file: &file, header: None, goals: false }, findings, log_of)
+}
+
+/// A log of what was asked for, as `finish` makes it of the samples.
+pub(super) fn read_asked<T>(
+    path: &Path,
+    asked: Asked<'_>,
+    findings: &mut Vec<Finding>,
+    finish: Finish<T>,
+) -> Result<T, LogError> {
+    let (map, file) = (asked.map, asked.file.to_string());
     let unreadable = |e| LogError::of_file(&file, "file", format!("cannot be read: {e}"));
     let mut place = Place::of(path)?;
     let path = place.path.clone();
     match place.format {
-        Format::Csv => parse(File::open(&path).map_err(unreadable)?, asked, findings),
+        Format::Csv => {
+            let opened = File::open(&path).map_err(unreadable)?;
+            rows(asked, findings, finish, |samples, notes| text::read(opened, &file, samples, notes))
+        }
         Format::Parquet => {
             let opened = File::open(&path).map_err(unreadable)?;
-            rows(asked, findings, |samples, _| columnar::read(opened, &file, samples).map(|()| false))
+            rows(asked, findings, finish, |samples, _| columnar::read(opened, &file, samples).map(|()| false))
         }
         Format::LeRobot => {
-            rows(asked, findings, |samples, notes| read_dataset(&path, &file, samples, notes).map(|()| false))
+            let read = |samples: &mut Samples<'_>, notes: &mut Vec<Finding>| {
+                read_dataset(&path, &file, samples, notes).map(|()| false)
+            };
+            rows(asked, findings, finish, read)
         }
         _ => {
             // With other topics left aside; an error names them all.
             if let Some(only) = map.topics() {
                 let contents = read_topics(&mut place, &file, Some(&only))?;
                 let mut own = contents.notes;
-                if let Ok(log) = topics::log(contents.tables, asked, &mut own) {
+                if let Ok(log) = topics::log(contents.tables, asked, &mut own, finish) {
                     findings.extend(own);
                     return Ok(log);
                 }
             }
             let contents = read_topics(&mut place, &file, None)?;
             findings.extend(contents.notes);
-            topics::log(contents.tables, asked, findings)
+            topics::log(contents.tables, asked, findings, finish)
         }
     }
 }
 
 /// Reads a log from lines.
+#[cfg(test)]
 pub(super) fn parse(
     input: impl Read,
     asked: Asked<'_>,
     findings: &mut Vec<Finding>,
 ) -> Result<Log, LogError> {
-    rows(asked, findings, |samples, notes| text::read(input, asked.file, samples, notes))
+    rows(asked, findings, log_of, |samples, notes| text::read(input, asked.file, samples, notes))
+}
+
+/// What is made of samples; whether the last one is torn.
+pub(super) type Finish<T> = for<'s> fn(Samples<'s>, bool) -> Result<T, LogError>;
+
+/// The log of an arm whose torques are measured.
+fn log_of(samples: Samples<'_>, torn: bool) -> Result<Log, LogError> {
+    samples.finish(torn)
 }
 
 /// Reads a log row by row; `read` says whether the last one is torn.
-pub(super) fn rows(
+pub(super) fn rows<T>(
     asked: Asked<'_>,
     findings: &mut Vec<Finding>,
+    finish: Finish<T>,
     read: impl FnOnce(&mut Samples<'_>, &mut Vec<Finding>) -> Result<bool, LogError>,
-) -> Result<Log, LogError> {
+) -> Result<T, LogError> {
     // Their header is their first line.
     let asked = Asked { header: Some(1), ..asked };
     let mut notes = Vec::new();
     let mut samples = Samples::new(asked, "line", findings);
     let torn = read(&mut samples, &mut notes)?;
-    let log = samples.finish(torn);
+    let log = finish(samples, torn);
     findings.extend(notes);
     log
 }
@@ -146,6 +173,22 @@ pub(super) enum Effort {
     Torque,
     /// A, with N·m/A (N/A) by joint.
     Current(Vec<f64>),
+    /// Set-points of position servos, rad or m.
+    Goal,
+}
+
+/// What columns of set-points are called.
+pub(super) const GOAL: &str = "goal";
+
+impl Effort {
+    /// What its columns are called.
+    pub(super) fn name(&self) -> &'static str {
+        match self {
+            Effort::Torque => "tau",
+            Effort::Current(_) => "i",
+            Effort::Goal => GOAL,
+        }
+    }
 }
 
 /// Samples as read: joint-major.
@@ -157,26 +200,29 @@ pub(super) struct Raw {
     pub(super) temperature: Option<Vec<Vec<f64>>>,
     pub(super) dq: Vec<Vec<f64>>,
     pub(super) motor: Option<Vec<Vec<f64>>>,
+    pub(super) of_servos: Vec<Option<Vec<Vec<f64>>>>,
 }
 
 impl Raw {
-    pub(super) fn new(dof: usize, temperature: bool, motor: bool) -> Raw {
+    pub(super) fn new(dof: usize, columns: &Columns) -> Raw {
         let empty = || vec![Vec::new(); dof];
         Raw {
             line: Vec::new(),
             t: Vec::new(),
             q: empty(),
             effort: empty(),
-            temperature: temperature.then(empty),
+            temperature: columns.temperature.as_ref().map(|_| empty()),
             dq: empty(),
-            motor: motor.then(empty),
+            motor: columns.motor.as_ref().map(|_| empty()),
+            of_servos: columns.of_servos.iter().map(|group| group.as_ref().map(|_| empty())).collect(),
         }
     }
 
     /// Makes room for `samples` more samples.
     fn expect(&mut self, samples: usize) {
         make_room(&mut self.line, samples);
-        let motor = self.motor.iter_mut().flatten().chain(&mut self.dq);
+        let of_servos = self.of_servos.iter_mut().flatten().flatten();
+        let motor = self.motor.iter_mut().flatten().chain(of_servos).chain(&mut self.dq);
         let optional = self.temperature.iter_mut().flatten().chain(motor);
         let by_joint = self.q.iter_mut().chain(&mut self.effort).chain(optional);
         by_joint.chain([&mut self.t]).for_each(|values| make_room(values, samples));
@@ -184,7 +230,9 @@ impl Raw {
 
     /// How many signals there are.
     fn signals(&self) -> usize {
-        let optional = self.temperature.iter().chain(&self.motor).map(Vec::len).sum::<usize>();
+        let of_servos = self.of_servos.iter().flatten();
+        let optional =
+            self.temperature.iter().chain(&self.motor).chain(of_servos).map(Vec::len).sum::<usize>();
         1 + self.q.len() + self.effort.len() + self.dq.len() + optional
     }
 
@@ -196,7 +244,7 @@ impl Raw {
             joint.extend(values.next());
         }
         // Last what says by being empty that it is not there.
-        let motor = self.motor.iter_mut().flatten();
+        let motor = self.motor.iter_mut().flatten().chain(self.of_servos.iter_mut().flatten().flatten());
         for joint in self.temperature.iter_mut().flatten().chain(motor).chain(&mut self.dq) {
             joint.extend(values.next());
         }
@@ -211,7 +259,7 @@ impl Raw {
         };
         filter(&mut self.t);
         self.q.iter_mut().chain(&mut self.effort).for_each(filter);
-        let motor = self.motor.iter_mut().flatten();
+        let motor = self.motor.iter_mut().flatten().chain(self.of_servos.iter_mut().flatten().flatten());
         self.temperature.iter_mut().flatten().chain(&mut self.dq).chain(motor).for_each(filter);
         let mut k = keep.iter();
         self.line.retain(|_| *k.next().unwrap_or(&true));
@@ -242,7 +290,21 @@ impl<'a> Samples<'a> {
     }
 
     /// The log of what was taken; `torn` where the last line is.
-    pub(super) fn finish(mut self, torn: bool) -> Result<Log, LogError> {
+    pub(super) fn finish(self, torn: bool) -> Result<Log, LogError> {
+        let map = self.asked.map;
+        let (log, effort, _) = self.finished(torn)?;
+        Ok(match effort {
+            Effort::Torque => log.shifted(&map.tau),
+            Effort::Current(_) => log.shifted(&map.i),
+            Effort::Goal => log,
+        })
+    }
+
+    /// The log of what was taken, what its torques were made of, and what only logs of servos have.
+    pub(super) fn finished(
+        mut self,
+        torn: bool,
+    ) -> Result<(Log, Effort, Vec<Option<Vec<Vec<f64>>>>), LogError> {
         let file = self.asked.file;
         if torn && self.total > 0 {
             let message =
@@ -269,14 +331,11 @@ impl<'a> Samples<'a> {
                     one) and were left out; short holes are filled by interpolation, long ones split the log"
             )));
         }
-        let Some((columns, raw)) = self.found else {
+        let Some((columns, mut raw)) = self.found else {
             return Err(LogError::of_file(file, "samples", "there are none"));
         };
-        let log = check::into_log(raw, &columns.effort, file, self.asked.arm, self.findings)?;
-        Ok(log.shifted(match columns.effort {
-            Effort::Torque => &self.asked.map.tau,
-            Effort::Current(_) => &self.asked.map.i,
-        }))
+        let log = check::into_log(&mut raw, &columns.effort, file, self.asked.arm, self.findings)?;
+        Ok((log, columns.effort, raw.of_servos))
     }
 }
 
@@ -317,7 +376,7 @@ impl Samples<'_> {
 impl RowSink for Samples<'_> {
     fn begin(&mut self, names: &[String]) -> Result<(), LogError> {
         let columns = Columns::find(names, self.asked, self.findings)?;
-        let raw = Raw::new(self.asked.arm.dof(), columns.temperature.is_some(), columns.motor.is_some());
+        let raw = Raw::new(self.asked.arm.dof(), &columns);
         self.found = Some((columns, raw));
         self.names = names.to_vec();
         Ok(())

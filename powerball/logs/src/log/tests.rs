@@ -51,7 +51,7 @@ fn text(header: &str, mut line: impl FnMut(usize, Vec<String>) -> Option<String>
 const HEADER: &str = "t,q1,q2,tau1,tau2";
 
 fn parse(bytes: &[u8], file: &str, arm: &Arm, findings: &mut Vec<Finding>) -> Result<Log, LogError> {
-    let asked = Asked { arm, map: &ColumnMap::default(), file, header: None };
+    let asked = Asked { arm, map: &ColumnMap::default(), file, header: None, goals: false };
     #[cfg(feature = "parquet")]
     if bytes.starts_with(b"PAR1") {
         let input = bytes::Bytes::copy_from_slice(bytes);

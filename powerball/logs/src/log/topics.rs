@@ -3,8 +3,8 @@
 
 use super::columns::{self, Asked};
 use super::map::{Clock, ColumnMap};
-use super::read::Samples;
-use super::{Finding, Log, LogError};
+use super::read::{Finish, Samples};
+use super::{Finding, LogError};
 use crate::signal::resample::{cubic_at, median_step};
 use crate::tables::Table;
 
@@ -88,11 +88,12 @@ fn implausible(stamps: &[f64], received: &[f64]) -> Option<String> {
 }
 
 /// The log in the tables of a file, whose columns become the log's.
-pub(super) fn log(
+pub(super) fn log<T>(
     mut tables: Vec<Table>,
     asked: Asked<'_>,
     findings: &mut Vec<Finding>,
-) -> Result<Log, LogError> {
+    finish: Finish<T>,
+) -> Result<T, LogError> {
     let (positions, torques) = choose(&tables, asked)?;
     let (mut table, map) = match std::ptr::eq(positions, torques) {
         true => {
@@ -116,7 +117,7 @@ pub(super) fn log(
     (table.stamps, table.received) = (Vec::new(), Vec::new());
     let mut samples = Samples::new(Asked { map: &map, ..asked }, called, findings);
     samples.table(table, time)?;
-    samples.finish(false)
+    finish(samples, false)
 }
 
 /// Whether a table has its time among its columns.
@@ -139,7 +140,7 @@ fn choose<'a>(tables: &'a [Table], asked: Asked<'_>) -> Result<(&'a Table, &'a T
         return error("topics", format!("no topic holds joint states that can be read here: {}", shown()));
     }
     let has = |table: &Table, key: &str| columns::group(&table.names(), key, asked).is_ok();
-    let torque = |t: &Table| has(t, "tau") || has(t, "i");
+    let torque = |t: &Table| asked.efforts().iter().any(|key| has(t, key));
     let said = |key: &str| asked.map.of(key).topic.as_ref().or(asked.map.topic.as_ref());
     let named = |topic: &String| match tables.iter().find(|t| t.name == *topic) {
         Some(table) => Ok(table),
@@ -150,7 +151,7 @@ fn choose<'a>(tables: &'a [Table], asked: Asked<'_>) -> Result<(&'a Table, &'a T
         )),
     };
     let positions = said("q").map(named).transpose()?;
-    let torques = said("tau").or(said("i")).map(named).transpose()?;
+    let torques = asked.efforts().iter().find_map(|key| said(key)).map(named).transpose()?;
     match (positions, torques) {
         (Some(q), Some(tau)) => return Ok((q, tau)),
         (Some(table), None) | (None, Some(table)) if has(table, "q") && torque(table) => {
@@ -222,7 +223,7 @@ fn join(
     let mut joined = Table::new("", "joined");
     joined.line = rows.iter().map(|k| torques.line[*k]).collect();
     (joined.stamps, joined.received) = (base.clone(), base.clone());
-    for key in ["q", "dq", "tau", "i", "temp", "motor"] {
+    for (key, _) in asked.map.quantities().into_iter().filter(|(key, _)| *key != "t") {
         let at_home = if matches!(key, "q" | "dq") { positions } else { torques };
         let said =
             asked.map.of(key).topic.as_ref().and_then(|topic| tables.iter().find(|t| t.name == *topic));

@@ -4,8 +4,9 @@
 
 use super::Failure;
 use super::bus::{Consent, Where, virtual_bus};
-use super::inputs::{Inputs, recorded};
+use super::inputs::{Inputs, recorded, sources};
 use super::output::{self, Accept, Progress, Verbosity, notes};
+use super::servos::{self, Masses};
 use crate::procedure::{Envelope, RecordError, record};
 use crate::report;
 use crate::report::explained::{change, nothing_named};
@@ -19,6 +20,7 @@ use powerball_explanation::experiment::{self, TRAJECTORY};
 use powerball_explanation::explain::{Explained, FalsePositives, NamedEffect, Rival, Unattributed, Verdict};
 use powerball_explanation::torque_model::TorqueModel;
 use powerball_explanation::{ExplainError, ExplainOptions, Prepared};
+use powerball_identification::Source;
 use powerball_identification::mounting::Mounting;
 use powerball_logs as logs;
 use powerball_logs::log::{Log, read_logs};
@@ -63,6 +65,8 @@ pub(crate) struct Explain {
     timings: bool,
     #[command(flatten)]
     accept: Accept,
+    #[command(flatten)]
+    masses: Masses,
     /// The bus that the arm of the experiment is on.
     #[arg(long, value_name = "URL", default_value = "virtual", requires = "experiment")]
     bus: BusUrl,
@@ -79,6 +83,10 @@ impl Explain {
         let progress = Progress::timed(self.timings);
         let experiment = if self.experiment { Some(self.arm()?) } else { None };
         let arm = Arm::read(&self.inputs.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let [fit, validate] = sources(&self.inputs, &self.validate)?;
+        if servos::are_of_servos(&fit, &arm) {
+            return self.servos((&fit, &validate), &arm, &progress, verbosity);
+        }
         let known = self.model.as_deref().map(TorqueModel::read).transpose();
         let known = known.map_err(|e| Failure::Unusable(e.to_string()))?;
         let mut recorded = recorded(&self.inputs, &self.validate, &arm, &progress)?;
@@ -109,6 +117,31 @@ impl Explain {
         explained.warnings.splice(0..0, recorded.warnings);
         progress.say("writing");
         self.write(&prepared.with_known(explained), verbosity)
+    }
+
+    /// As it is done for arms on position servos.
+    fn servos(
+        &self,
+        logs: (&[Source<'_>], &[Source<'_>]),
+        arm: &Arm,
+        progress: &Progress,
+        verbosity: Verbosity,
+    ) -> Result<(), Failure> {
+        if self.model.is_some() || self.experiment {
+            return Err(Failure::Unusable(
+                "--model and --experiment take logs with torques; these are of position servos (goal1 … and no torque)".into(),
+            ));
+        }
+        output::make_folder(&self.inputs.out)?;
+        let asked = servos::Asked {
+            arm: (arm, &self.inputs.arm),
+            masses: &self.masses,
+            logs,
+            out: &self.inputs.out,
+            json: self.inputs.json,
+            accept: self.accept,
+        };
+        servos::explain(&asked, progress, verbosity)
     }
 
     /// Writes the trajectory of the experiment that an explanation asks for.

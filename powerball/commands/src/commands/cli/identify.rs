@@ -4,6 +4,7 @@
 
 use super::inputs::{MapArgument, MountedLogs};
 use super::output::{Accept, Verbosity};
+use super::servos::{self, Masses};
 use super::{Failure, output};
 use crate::report;
 use clap::{Args, ValueEnum};
@@ -28,7 +29,8 @@ use std::path::{Path, PathBuf};
 #[command(
     after_help = "Examples:\n  powerball identify --arm arm.toml --log a.csv b.csv --validate c.csv --out \
         result\n  powerball identify --arm arm.toml --log a.summary b.summary --out result\n  \
-    powerball identify --arm arm.toml --log upright.csv --mounting 90,0 --log on_its_side.csv --out result"
+    powerball identify --arm arm.toml --log upright.csv --mounting 90,0 --log on_its_side.csv --out result\n  \
+    powerball identify --arm servos.toml --log goals_and_positions.csv --validate other.csv --out result"
 )]
 pub(crate) struct Identify {
     /// The arm file (TOML).
@@ -53,6 +55,8 @@ pub(crate) struct Identify {
     /// and effects is written into the folder of the results, under its name.
     #[arg(long, value_name = "ORIGINAL")]
     export: Option<PathBuf>,
+    #[command(flatten)]
+    masses: Masses,
     /// Print how long each phase took, on standard error.
     #[arg(long)]
     timings: bool,
@@ -96,6 +100,10 @@ impl Identify {
         let known = self.model.as_deref().map(ModelFile::read).transpose();
         let known = known.map_err(|e| Failure::Unusable(e.to_string()))?;
         let terminal = output::Progress::timed(self.timings);
+        let logs = self.logs.clone().mapped(self.map.read()?);
+        if servos::are_of_servos(&logs.log, &arm) {
+            return self.servos(&arm, &logs, &terminal, verbosity);
+        }
         let say = |what: &str| terminal.say(what);
         let options = IdentifyOptions {
             friction: match self.friction {
@@ -113,7 +121,6 @@ impl Identify {
         };
         output::make_folder(&self.out)?;
         let original = self.export.as_deref().map(|path| Original::read(path, &self.out)).transpose()?;
-        let logs = self.logs.mapped(self.map.read()?);
         let identified = identify(&arm, &logs.log, &logs.validate, &options)?;
         terminal.say("writing");
         let known = known.as_ref().map(|known| &known.model.additions);
@@ -128,6 +135,33 @@ impl Identify {
             original.write(&arm, &files.first(), &self.out.join("identified.json"))?;
         }
         self.accept.judge(&identified.unusable)
+    }
+}
+
+impl Identify {
+    /// As it is done for arms on position servos.
+    fn servos(
+        &self,
+        arm: &Arm,
+        logs: &MountedLogs,
+        terminal: &output::Progress,
+        verbosity: Verbosity,
+    ) -> Result<(), Failure> {
+        if self.model.is_some() || self.export.is_some() {
+            return Err(Failure::Unusable(
+                "--model and --export take logs with torques; these are of position servos (goal1 … and no torque)".into(),
+            ));
+        }
+        output::make_folder(&self.out)?;
+        let asked = servos::Asked {
+            arm: (arm, &self.arm),
+            masses: &self.masses,
+            logs: (&logs.log, &logs.validate),
+            out: &self.out,
+            json: self.json,
+            accept: self.accept,
+        };
+        servos::identify(&asked, terminal, verbosity)
     }
 }
 

@@ -109,14 +109,19 @@ pub(crate) fn recorded(
     progress: &Progress,
 ) -> Result<Recorded, Failure> {
     progress.say("reading logs");
-    let map = Arc::new(inputs.map.read()?);
-    let sources = |files: &[PathBuf]| -> Vec<Source<'static>> {
-        files.iter().map(|file| Source::file(file).mapped(Arc::clone(&map))).collect()
-    };
-    let mut read = Recorded::read(arm, &sources(&inputs.log), &sources(validate))?;
+    let [fit, validate] = sources(inputs, validate)?;
+    let mut read = Recorded::read(arm, &fit, &validate)?;
     read.warnings.splice(0..0, notes_of(arm));
     output::make_folder(&inputs.out)?;
     Ok(read)
+}
+
+/// The logs to fit and those for validation, with the map of their columns.
+pub(crate) fn sources(inputs: &Inputs, validate: &[PathBuf]) -> Result<[Vec<Source<'static>>; 2], Failure> {
+    let map = Arc::new(inputs.map.read()?);
+    let of =
+        |files: &[PathBuf]| files.iter().map(|file| Source::file(file).mapped(Arc::clone(&map))).collect();
+    Ok([of(&inputs.log), of(validate)])
 }
 
 // Logs with the mounting of the base that each was recorded in.

@@ -25,6 +25,7 @@ mod profile;
 mod record;
 mod replace;
 mod serve;
+mod servos;
 mod shell;
 mod summarize;
 mod verify;

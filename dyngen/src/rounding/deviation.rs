@@ -1,0 +1,117 @@
+//! Bounds of functions that divide by pivots of B: exact values and what the emitted ones are off by, kept apart.
+//!
+//! What is known of a solve (`known.rs`) holds for exact values alone. So each operation has the range of its exact value
+//! and, forwards from its operands, how far the emitted one may be off (running error analysis, Higham 2002, §3.3). The
+//! derivatives by each rounding are operations like the others: at every t·δ they are within the same two.
+
+use super::interval::Interval;
+use super::known::Known;
+use super::precision::PRECISIONS;
+use super::program::{EXACT, Errors, Operation, Program, TINY, Workspace};
+
+impl Program {
+    /// As [`Program::errors`]; `None` where there is no bound.
+    pub(super) fn errors_from_exact(
+        &self,
+        known: &[Option<Known>],
+        ranges: &[Interval],
+        workspace: &mut Workspace,
+    ) -> Option<Errors> {
+        let Workspace { values, errors, deviations } = workspace;
+        values.clear();
+        errors.clear();
+        deviations.clear();
+        for (k, operation) in self.operations.iter().enumerate() {
+            let (value, from_operands) = self.exact(*operation, ranges, values, deviations)?;
+            let mut error = match *operation {
+                Operation::Constant(_, errors) => errors,
+                Operation::Variable(_) => EXACT,
+                Operation::Sine(index) => self.angles[index].1.turned(true, ranges)?.1,
+                Operation::Cosine(index) => self.angles[index].1.turned(false, ranges)?.1,
+                Operation::Mul(a, b) if self.is_power_of_two(a) || self.is_power_of_two(b) => TINY,
+                _ => rounds(value, from_operands),
+            };
+            if k >= self.emitted {
+                error = EXACT;
+            }
+            errors.push(error);
+            let mut value = value.widened(0.0);
+            if let Some(norm) = &self.norms[k] {
+                value = value.clamped(norm.bound(values, errors));
+            }
+            value = match &known[k] {
+                None => value,
+                Some(Known::Range(range)) => value.within_range(*range),
+                Some(Known::Sum(terms)) => {
+                    let most: f64 = terms.iter().map(|(factor, r)| factor * values[*r].magnitude()).sum();
+                    value.clamped(most * (1.0 + 1e-12))
+                }
+            };
+            let deviation = [0, 1].map(|p| (from_operands[p] + error[p]) * GROWN);
+            let most = value.magnitude() + deviation[0];
+            if most >= f64::from(f32::MAX) || most.is_nan() {
+                return None;
+            }
+            values.push(value);
+            deviations.push(deviation);
+        }
+        let mut total = [0.0; 2];
+        for (slope, error) in self.slopes.iter().zip(&*errors) {
+            if let Some(slope) = slope {
+                for (p, total) in total.iter_mut().enumerate() {
+                    *total += (values[*slope].magnitude() + deviations[*slope][p]) * error[p];
+                }
+            }
+        }
+        // Of two bounds the smaller; a sum of n terms rounds n times.
+        let grown = 1.0 + self.len() as f64 * f64::EPSILON;
+        let forwards = deviations[self.emitted - 1];
+        Some([0, 1].map(|p| (total[p] * grown).min(forwards[p])))
+    }
+
+    /// The exact value, its ends rounded, and by how much the emitted operands move the result.
+    fn exact(
+        &self,
+        operation: Operation,
+        ranges: &[Interval],
+        values: &[Interval],
+        deviations: &[Errors],
+    ) -> Option<(Interval, Errors)> {
+        let size = |a: usize| values[a].magnitude();
+        Some(match operation {
+            Operation::Constant(value, errors) => (value.widened(errors[1]), EXACT),
+            Operation::Variable(index) => (ranges[index], EXACT),
+            Operation::Sine(index) => (self.angles[index].1.turned(true, ranges)?.0, EXACT),
+            Operation::Cosine(index) => (self.angles[index].1.turned(false, ranges)?.0, EXACT),
+            Operation::Add(a, b, negative) => {
+                let moved = [0, 1].map(|p| deviations[a][p] + deviations[b][p]);
+                (values[a].plus(values[b].negated(negative)), moved)
+            }
+            Operation::Mul(a, b) => {
+                let moved = |p: usize| {
+                    let (x, y) = (deviations[a][p], deviations[b][p]);
+                    size(a) * y + size(b) * x + x * y
+                };
+                (values[a].times(values[b]), [moved(0), moved(1)])
+            }
+            Operation::Div(a, b) => {
+                let value = values[a].times(values[b].inverse()?.widened(0.0));
+                let least = values[b].low.abs().min(values[b].high.abs());
+                let moved = |p: usize| {
+                    let apart = least - deviations[b][p];
+                    let moved = deviations[a][p] + value.magnitude() * GROWN * deviations[b][p];
+                    (apart > 0.0).then(|| moved / apart)
+                };
+                (value, [moved(0)?, moved(1)?])
+            }
+        })
+    }
+}
+
+/// What an operation rounds whose operands are off.
+fn rounds(value: Interval, moved: Errors) -> Errors {
+    [0, 1].map(|p| PRECISIONS[p].half_ulp((value.magnitude() + moved[p]) * GROWN))
+}
+
+/// For bounds of a few roundings of doubles.
+const GROWN: f64 = 1.0 + 1e-12;

@@ -1,0 +1,234 @@
+//! What is known of the numbers between B and the results of a solve with LᵀDL: bounds for every pose.
+//!
+//! The optimiser is free to reorder sums, so an operation is recognised by its value: at a random point of the 61-bit prime
+//! field it equals that of an entry of L, of B⁻¹, … (two that differ agree there with a chance below 2⁻⁵⁴, as in
+//! `prove/`). The same holds for derivatives of the result by each of the operations.
+
+use super::factors::Factors;
+use super::interval::Interval;
+use super::program::Operation;
+use crate::dynamics::{Function, FunctionGraph};
+use crate::exact::prime::{Draws, Fp};
+use crate::model::Model;
+use crate::parameters::SetKind;
+use crate::prove::{self, Point};
+use rustc_hash::FxHashMap;
+use std::rc::Rc;
+
+/// A bound of an operation's exact value.
+#[derive(Clone, Debug)]
+pub(super) enum Known {
+    /// It lies there.
+    Range(Interval),
+    /// Its size is at most the sum of factors times the sizes of other operations.
+    Sum(Vec<(f64, usize)>),
+}
+
+/// What is known of a number, by its value at the random point.
+#[derive(Clone, Debug)]
+enum Fact {
+    Range(Interval),
+    /// A sum over a right-hand side's entries.
+    Sum(Rc<[Fp]>, Vec<f64>),
+}
+
+/// All facts about a function, with the values of its operations.
+pub(super) struct Facts {
+    facts: FxHashMap<u64, Fact>,
+    nodes: Vec<Option<Fp>>,
+}
+
+/// LᵀDL at the random point, and the ranges of its entries.
+struct Solve<'a> {
+    n: usize,
+    ranges: &'a Factors,
+    b: Vec<Fp>,
+    lower: Vec<Fp>,
+    lower_inverse: Vec<Fp>,
+    inverse: Vec<Fp>,
+    pivots: Vec<Fp>,
+}
+
+impl Facts {
+    /// `None` where the point is none of the function's, which chance excludes.
+    pub(super) fn new(model: &Model, built: &FunctionGraph, ranges: &Factors) -> Option<Facts> {
+        let set = model.set(SetKind::Minimal).ok()?;
+        let mut draws = Draws::new(0x0073_6f6c_7665);
+        let point = Point::draw(model.arm(), model.symbols(), model.sets(), &mut draws);
+        let expected = |function| prove::expected(&point, set, function);
+        let solve =
+            Solve::new(expected(Function::MassMatrix), expected(Function::MassMatrixInverse), ranges)?;
+        let mut facts = Facts { facts: FxHashMap::default(), nodes: point.nodes(set, built)? };
+        facts.of_factors(&solve);
+        let n = solve.n;
+        match built.function {
+            Function::MassMatrixInverse => facts.of_inverse(&solve),
+            Function::ForwardDynamics => facts.of_solution(&solve, &expected(Function::ForwardDynamics)),
+            Function::AccelerationByPosition | Function::AccelerationByVelocity => {
+                facts.of_solution(&solve, &expected(Function::ForwardDynamics));
+                let columns = expected(built.function);
+                for c in 0..n {
+                    let column: Vec<Fp> = (0..n).map(|i| columns[i * n + c]).collect();
+                    facts.of_solution(&solve, &column);
+                }
+            }
+            _ => {
+                for row in expected(Function::Jacobian).chunks(n) {
+                    facts.of_solution(&solve, &product(&solve.inverse, row));
+                }
+            }
+        }
+        Some(facts)
+    }
+
+    fn add(&mut self, value: Fp, fact: Fact) {
+        if value != Fp::ZERO {
+            self.facts.entry(value.residue()).or_insert(fact);
+        }
+    }
+
+    fn range(&mut self, value: Fp, range: Interval) {
+        self.add(value, Fact::Range(range));
+    }
+
+    /// Entries of L, D, their inverses and B⁻¹.
+    fn of_factors(&mut self, solve: &Solve<'_>) {
+        let Solve { n, ranges, .. } = solve;
+        for i in 0..*n {
+            let d = ranges.pivots[i];
+            let inverse = d.inverse().unwrap_or(Interval::within(f64::INFINITY)).widened(0.0);
+            let of_pivot = solve.pivots[i].inverse().unwrap_or(Fp::ZERO);
+            self.range(solve.pivots[i], d);
+            self.range(of_pivot, inverse);
+            for j in 0..*n {
+                let at = i * n + j;
+                self.range(solve.inverse[at], ranges.inverse[at]);
+                if j < i {
+                    let (l, of) = (ranges.lower[at], ranges.lower_inverse[at]);
+                    self.range(solve.lower[at], l);
+                    self.range(solve.lower[at] * solve.pivots[i], l.times(d).widened(0.0));
+                    self.range(solve.lower_inverse[at], of);
+                    let of_pivot = solve.pivots[j].inverse().unwrap_or(Fp::ZERO);
+                    let inverse = ranges.pivots[j].inverse().unwrap_or(Interval::within(f64::INFINITY));
+                    self.range(solve.lower_inverse[at] * of_pivot, of.times(inverse).widened(0.0));
+                }
+            }
+        }
+    }
+
+    /// The derivatives of B⁻¹ by what is left of B: ∂X = −X·∂S·X.
+    fn of_inverse(&mut self, solve: &Solve<'_>) {
+        let (n, x, ranges) = (solve.n, &solve.inverse, &solve.ranges.inverse);
+        for (o, c) in (0..n).flat_map(|o| (0..n).map(move |c| (o, c))) {
+            for (a, b) in (0..n).flat_map(|a| (0..=a).map(move |b| (a, b))) {
+                let first = x[o * n + a] * x[b * n + c];
+                let of_first = ranges[o * n + a].times(ranges[b * n + c]).widened(0.0);
+                let second = x[o * n + b] * x[a * n + c];
+                let of_second = ranges[o * n + b].times(ranges[a * n + c]).widened(0.0);
+                match a == b {
+                    true => self.range(first, of_first),
+                    false => self.range(first + second, of_first.plus(of_second).widened(0.0)),
+                }
+            }
+        }
+    }
+
+    /// What is computed on the way from r = B·x to x, and the derivatives of x by what is left of B.
+    fn of_solution(&mut self, solve: &Solve<'_>, x: &[Fp]) {
+        let (n, ranges) = (solve.n, solve.ranges);
+        let right: Rc<[Fp]> = product(&solve.b, x).into();
+        let size = |o: usize, j: usize| ranges.inverse[o * n + j].magnitude();
+        let of = |i: usize, factor: f64| -> Vec<f64> {
+            let entry = |j: usize| if j < i { 0.0 } else { ranges.lower_inverse[j * n + i].magnitude() };
+            (0..n).map(|j| entry(j) * factor * ROUNDED).collect()
+        };
+        for i in 0..n {
+            self.add(x[i], Fact::Sum(right.clone(), (0..n).map(|j| size(i, j)).collect()));
+            let z = (0..=i).fold(Fp::ZERO, |sum, j| sum + solve.lower[i * n + j] * x[j]);
+            self.add(z, Fact::Sum(right.clone(), of(i, 1.0 / ranges.pivots[i].low)));
+            self.add(solve.pivots[i] * z, Fact::Sum(right.clone(), of(i, 1.0)));
+        }
+        for o in 0..n {
+            for (a, b) in (0..n).flat_map(|a| (0..=a).map(move |b| (a, b))) {
+                let first = solve.inverse[o * n + a] * x[b];
+                let second = if a == b { Fp::ZERO } else { solve.inverse[o * n + b] * x[a] };
+                let twice = if a == b { 0.0 } else { 1.0 };
+                let factor = |j: usize| (size(o, a) * size(b, j) + twice * size(o, b) * size(a, j)) * ROUNDED;
+                self.add(first + second, Fact::Sum(right.clone(), (0..n).map(factor).collect()));
+            }
+        }
+    }
+
+    /// For each operation what is known of it; `nodes` are those of the emitted ones, which stand first.
+    pub(super) fn of(&self, operations: &[Operation], nodes: &[usize]) -> Option<Vec<Option<Known>>> {
+        let mut values: Vec<Fp> = Vec::with_capacity(operations.len());
+        for (k, operation) in operations.iter().enumerate() {
+            values.push(match (nodes.get(k), operation) {
+                (Some(node), _) => self.nodes[*node]?,
+                (_, Operation::Add(a, b, true)) => values[*a] - values[*b],
+                (_, Operation::Add(a, b, false)) => values[*a] + values[*b],
+                (_, Operation::Mul(a, b)) => values[*a] * values[*b],
+                (_, Operation::Div(a, b)) => values[*a] * values[*b].inverse()?,
+                // Derivatives add no other constant.
+                _ => Fp::ONE,
+            });
+        }
+        let mut places: FxHashMap<u64, usize> = FxHashMap::default();
+        for (k, value) in values.iter().enumerate() {
+            places.entry(value.residue()).or_insert(k);
+            places.entry((-*value).residue()).or_insert(k);
+        }
+        let known = |(k, value): (usize, &Fp)| {
+            let turned = |fact: Option<&Fact>, negative: bool| match fact? {
+                Fact::Range(range) => Some(Known::Range(range.negated(negative))),
+                Fact::Sum(right, factors) => {
+                    let terms = right.iter().zip(factors).filter(|(r, _)| **r != Fp::ZERO);
+                    let place = |r: &Fp| places.get(&r.residue()).copied().filter(|place| *place < k);
+                    let terms: Option<Vec<_>> = terms.map(|(r, factor)| Some((*factor, place(r)?))).collect();
+                    terms.map(Known::Sum)
+                }
+            };
+            turned(self.facts.get(&value.residue()), false)
+                .or_else(|| turned(self.facts.get(&(-*value).residue()), true))
+        };
+        Some(values.iter().enumerate().map(known).collect())
+    }
+}
+
+impl<'a> Solve<'a> {
+    fn new(b: Vec<Fp>, inverse: Vec<Fp>, ranges: &'a Factors) -> Option<Self> {
+        let n = ranges.n;
+        let (mut lower, mut scaled, mut pivots) =
+            (vec![Fp::ZERO; n * n], vec![Fp::ZERO; n * n], vec![Fp::ZERO; n]);
+        for i in (0..n).rev() {
+            let eliminated = |j: usize, lower: &[Fp], scaled: &[Fp]| {
+                (i + 1..n).fold(b[i * n + j], |sum, k| sum - lower[k * n + i] * scaled[k * n + j])
+            };
+            pivots[i] = eliminated(i, &lower, &scaled);
+            let of_pivot = pivots[i].inverse()?;
+            lower[i * n + i] = Fp::ONE;
+            for j in 0..i {
+                scaled[i * n + j] = eliminated(j, &lower, &scaled);
+                lower[i * n + j] = scaled[i * n + j] * of_pivot;
+            }
+        }
+        let mut lower_inverse = vec![Fp::ZERO; n * n];
+        for j in 0..n {
+            lower_inverse[j * n + j] = Fp::ONE;
+            for i in j + 1..n {
+                let sum = (j..i).fold(Fp::ZERO, |sum, c| sum + lower[i * n + c] * lower_inverse[c * n + j]);
+                lower_inverse[i * n + j] = -sum;
+            }
+        }
+        Some(Solve { n, ranges, b, lower, lower_inverse, inverse, pivots })
+    }
+}
+
+/// A·x of a square matrix.
+fn product(matrix: &[Fp], x: &[Fp]) -> Vec<Fp> {
+    let dot = |row: &[Fp]| row.iter().zip(x).fold(Fp::ZERO, |sum, (a, b)| sum + *a * *b);
+    matrix.chunks(x.len()).map(dot).collect()
+}
+
+/// More than what a few products and sums of positive doubles round.
+const ROUNDED: f64 = 1.0 + 1e-12;

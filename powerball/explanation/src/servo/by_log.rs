@@ -1,0 +1,168 @@
+//! What one log of position servos has that the others do not: another mass at the end of the arm, or another gain.
+//!
+//! Each log is asked alone, with the servo as it was found on all: which mass, or which gain, would lower its position error?
+//! A log is unlike the others where its squared error is twice theirs, one of them takes away half of it, and is larger than
+//! what the same question gives on the other logs by chance.
+
+use crate::rule::Rule;
+use powerball_identification::servo::constants::Constant;
+use powerball_identification::servo::fit::{Fitted, Free, errors, fit, objective, slopes};
+use powerball_identification::servo::{Problem, Role, standard_errors};
+
+/// Masses that are tried first, in units of the mass whose weight is a tenth of the torque at full duty: a swing in phase
+/// with another mass is a minimum too.
+const MASSES: [f64; 10] = [-1.0, -0.6, -0.3, 0.0, 0.3, 0.6, 1.0, 1.6, 2.4, 3.5];
+/// Gains that are tried first, as shares of the one of the arm file.
+const GAINS: [f64; 7] = [0.2, 0.35, 0.6, 1.0, 1.6, 2.7, 4.5];
+/// How many of them are refined, in how many steps.
+const REFINED: usize = 3;
+const STEPS: usize = 20;
+/// Sizes that differ by less than this share of them are one change.
+const ALIKE: f64 = 0.3;
+/// Standard errors that a change must be away from none.
+const CLEAR: f64 = 3.0;
+
+/// What may differ in a log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Change {
+    /// A mass at the end of the arm, kg.
+    Payload,
+    /// The drive's gain, in units of the arm file's.
+    Gain,
+}
+
+impl Change {
+    pub(super) const ALL: [Change; 2] = [Change::Payload, Change::Gain];
+
+    /// Its name in results.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Change::Payload => "payload",
+            Change::Gain => "torque_constant",
+        }
+    }
+
+    /// The value that changes nothing.
+    pub(super) fn none(self) -> f64 {
+        match self {
+            Change::Payload => 0.0,
+            Change::Gain => 1.0,
+        }
+    }
+}
+
+/// A change as some logs have it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Size {
+    /// kg, or a share.
+    pub value: f64,
+    /// Its standard error within these logs.
+    pub std: f64,
+    /// The objective without it and with it, rad².
+    pub before: f64,
+    pub after: f64,
+}
+
+impl Size {
+    /// The share of the squared error that stays.
+    pub(super) fn left(&self) -> f64 {
+        self.after / self.before.max(f64::MIN_POSITIVE)
+    }
+}
+
+/// The size of a change in the logs of a problem, everything else as it is there; `None` where the joint cannot show it.
+pub(super) fn size(problem: &Problem<'_>, change: Change) -> Option<Size> {
+    let (role, unit, first): (Role, f64, &[f64]) = match change {
+        Change::Payload => {
+            let weight = problem.payload_torque();
+            let torque = problem.constants.of(Constant::Torque);
+            (Role::Payload, (weight > 1e-6 * torque).then(|| 0.1 * torque / weight)?, &MASSES)
+        }
+        Change::Gain => (Role::Constant(Constant::Kp), problem.constants.of(Constant::Kp), &GAINS),
+    };
+    let asked = problem.asking(vec![role]);
+    let least = if change == Change::Gain { 0.05 * unit } else { f64::NEG_INFINITY };
+    let free = [Free { scale: unit, least }];
+    let at = |value: f64| {
+        let errors = errors(&asked, &[value]);
+        Fitted { objective: objective(&errors), values: vec![value], errors }
+    };
+    let mut starts: Vec<Fitted> = first.iter().map(|share| at(share * unit)).collect();
+    let before =
+        objective(&errors(&asked, &[change.none() * if change == Change::Gain { unit } else { 1.0 }]));
+    starts.sort_by(|a, b| a.objective.total_cmp(&b.objective));
+    let refined = starts.iter().take(REFINED).map(|start| fit(&asked, &start.values, &free, STEPS));
+    let best = refined.min_by(|a, b| a.objective.total_cmp(&b.objective))?;
+    let slopes = slopes(&asked, &best.values, &free);
+    let std = standard_errors(&slopes, &best.errors, &free, problem.block())[0]?;
+    let scale = if change == Change::Gain { unit } else { 1.0 };
+    Some(Size { value: best.values[0] / scale, std: std / scale, before, after: best.objective })
+}
+
+/// The sizes of every change in every log, one problem a log.
+pub(super) fn sizes(logs: &[Problem<'_>]) -> Vec<[Option<Size>; 2]> {
+    logs.iter().map(|log| Change::ALL.map(|change| size(log, change))).collect()
+}
+
+/// How much each change differs between logs that have none: what a size is compared with in addition to its own error.
+pub(super) fn spread(sizes: &[[Option<Size>; 2]], odd: &[bool], change: Change) -> f64 {
+    let mut values: Vec<f64> = sizes
+        .iter()
+        .zip(odd)
+        .filter(|(_, odd)| !**odd)
+        .filter_map(|(of, _)| Some((of[change as usize]?.value - change.none()).abs()))
+        .collect();
+    values.sort_by(f64::total_cmp);
+    // The median of |x| of a normal x is 0.6745 of its deviation.
+    values.get(values.len() / 2).map_or(0.0, |median| median / 0.6745)
+}
+
+/// Which logs are unlike the others: by log, the change that explains it best.
+pub(super) fn odd(sizes: &[[Option<Size>; 2]], rule: &Rule) -> Vec<Option<Change>> {
+    let none = vec![false; sizes.len()];
+    let mut errors: Vec<f64> =
+        sizes.iter().flat_map(|of| of.iter().flatten().next()).map(|size| size.before).collect();
+    errors.sort_by(f64::total_cmp);
+    let usual = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
+    let spreads = Change::ALL.map(|change| spread(sizes, &none, change));
+    let best = |of: &[Option<Size>; 2]| -> Option<Change> {
+        let clear = |change: &Change| {
+            of[*change as usize].is_some_and(|size| {
+                let error = size.std.hypot(spreads[*change as usize]);
+                let is_large = size.before > rule.odd_log * usual;
+                is_large
+                    && size.left() <= rule.event_left
+                    && (size.value - change.none()).abs() > CLEAR * error
+            })
+        };
+        let left = |change: &Change| of[*change as usize].map_or(f64::INFINITY, |size| size.after);
+        Change::ALL.into_iter().filter(clear).min_by(|a, b| left(a).total_cmp(&left(b)))
+    };
+    sizes.iter().map(best).collect()
+}
+
+/// The logs of each change, those whose sizes agree together: two loads are two effects.
+pub(super) fn groups(changes: &[Option<Change>], sizes: &[[Option<Size>; 2]]) -> Vec<(Change, Vec<usize>)> {
+    let mut groups: Vec<(Change, Vec<usize>)> = Vec::new();
+    for change in Change::ALL {
+        let of = |k: &usize| sizes[*k][change as usize];
+        let mut own: Vec<usize> = (0..changes.len()).filter(|k| changes[*k] == Some(change)).collect();
+        own.sort_by(|a, b| of(a).map_or(0.0, |s| s.value).total_cmp(&of(b).map_or(0.0, |s| s.value)));
+        let mut last: Option<Size> = None;
+        for k in own {
+            let Some(size) = of(&k) else { continue };
+            let apart = |last: Size| {
+                let difference = (size.value - last.value).abs();
+                let share =
+                    difference / (size.value - change.none()).abs().max((last.value - change.none()).abs());
+                difference > CLEAR * size.std.hypot(last.std) && share > ALIKE
+            };
+            match groups.last_mut() {
+                Some((of, logs)) if *of == change && !last.is_some_and(apart) => logs.push(k),
+                _ => groups.push((change, vec![k])),
+            }
+            last = Some(size);
+        }
+    }
+    groups
+}

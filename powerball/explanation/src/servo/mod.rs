@@ -1,0 +1,364 @@
+//! What the model of an arm on position servos lacks, judged by positions of other logs.
+//!
+//! The base of each joint is its closed loop with Coulomb and viscous friction. What candidates add must lower the error of
+//! simulated positions on the validation logs, block by block; what one log has alone is looked for first, since such a log
+//! would bend everything else.
+
+mod by_log;
+mod result;
+#[cfg(test)]
+mod tests;
+
+use crate::rule::Rule;
+use by_log::{Change, Size};
+use powerball_controller::JointNumber;
+use powerball_identification::IdentifyError;
+use powerball_identification::estimate::distribution::f_tail;
+use powerball_identification::servo::constants::Constant;
+use powerball_identification::servo::fit::{Free, errors, fit};
+use powerball_identification::servo::{Joint, Problem, Role, ServoArm, rms};
+use powerball_logs::Progress;
+use powerball_logs::log::ServoLog;
+pub use result::{Both, Differs, ExplainedServos, LogResult, ServoEffect, ServoRival, ServoVerdict};
+use serde_json::json;
+
+/// What a model of servos may lack on all logs, with what it frees.
+const CANDIDATES: [(&str, &[Constant]); 2] =
+    [("load_friction", &[Constant::Load]), ("stribeck", &[Constant::Stribeck, Constant::StribeckVelocity])];
+/// Steps of the fit with a candidate.
+const STEPS: usize = 40;
+
+/// Explains logs of position servos: what they lack on all logs, and what single logs have.
+///
+/// # Errors
+/// Arms and logs that cannot be used: why.
+pub fn explain_servos(
+    arm: &ServoArm,
+    logs: &[ServoLog],
+    validate: &[ServoLog],
+    rule: &Rule,
+    progress: Progress<'_>,
+) -> Result<ExplainedServos, IdentifyError> {
+    let mut result = ExplainedServos::of(arm, logs, validate);
+    for j in 0..arm.body.dof() {
+        progress.say(&format!("explaining joint {}", j + 1));
+        explain_joint(&mut result, arm, (logs, validate), j, rule)?;
+    }
+    result.conclude(rule);
+    Ok(result)
+}
+
+/// One joint: odd logs, the base without them, what it lacks.
+fn explain_joint(
+    result: &mut ExplainedServos,
+    arm: &ServoArm,
+    (logs, validate): (&[ServoLog], &[ServoLog]),
+    j: usize,
+    rule: &Rule,
+) -> Result<(), IdentifyError> {
+    let mut like: Vec<ServoLog> = logs.to_vec();
+    let mut found = Odd::in_logs(arm, &like, (logs, validate), j, rule)?;
+    if found.changes[..logs.len()].iter().any(Option::is_some) {
+        // They had a part in what they were compared with.
+        let own = logs.iter().zip(&found.changes).filter(|(_, odd)| odd.is_none());
+        like = own.map(|(log, _)| log.clone()).collect();
+        if like.is_empty() {
+            like = logs.to_vec();
+        }
+        found = Odd::in_logs(arm, &like, (logs, validate), j, rule)?;
+    }
+    let odd_in = |of: &[ServoLog], from: usize| -> Vec<ServoLog> {
+        of.iter()
+            .zip(&found.changes[from..])
+            .filter(|(_, odd)| odd.is_none())
+            .map(|(log, _)| log.clone())
+            .collect()
+    };
+    let held_out = odd_in(validate, logs.len());
+    // What no other log can judge is judged where it was found.
+    let held_out = if held_out.is_empty() { &like } else { &held_out };
+    let known = arm.known(j);
+    let mut problem =
+        Problem::new(&arm.body, &like, j, &known).ok_or_else(|| IdentifyError::NothingUsable(Vec::new()))?;
+    problem.roles.retain(|role| *role != Role::Constant(Constant::Load));
+    let mut joint = Joint::solve(problem);
+    let base = joint.problem.in_logs(&arm.body, logs, j);
+    let base_validate = joint.problem.in_logs(&arm.body, validate, j);
+    result.before.add(&errors(&base, &[]), &errors(&base_validate, &[]));
+    for _ in 0..CANDIDATES.len() {
+        let Some((next, effect)) = best_candidate(arm, &joint, held_out, j, rule, result) else { break };
+        joint = next;
+        result.effects.push(effect);
+    }
+    report_odd(result, arm, &joint, (logs, validate), &found, j);
+    Ok(())
+}
+
+/// The candidate that lowers the held-out error most, where one does by the rule.
+fn best_candidate<'l>(
+    arm: &ServoArm,
+    joint: &Joint<'l>,
+    held_out: &[ServoLog],
+    j: usize,
+    rule: &Rule,
+    result: &ExplainedServos,
+) -> Option<(Joint<'l>, ServoEffect)> {
+    let number = JointNumber::from_index(j);
+    let own = |effect: &ServoEffect| effect.joints.contains(&number);
+    let named: Vec<&str> = result.effects.iter().filter(|e| own(e)).map(|e| e.effect).collect();
+    let blocks = |joint: &Joint<'_>| {
+        let problem = joint.problem.in_logs(&arm.body, held_out, j);
+        block_squares(&errors(&problem, &[]), problem.block())
+    };
+    let before = blocks(joint);
+    let mut tried: Vec<(Joint<'l>, &'static str, f64, f64)> = Vec::new();
+    for (name, constants) in CANDIDATES.iter().filter(|(name, _)| !named.contains(name)) {
+        let next = with(joint, constants);
+        let after = blocks(&next);
+        let left = after.iter().sum::<f64>() / before.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        tried.push((next, name, left, p_value(&before, &after)));
+    }
+    tried.sort_by(|a, b| a.2.total_cmp(&b.2));
+    let level = rule.family_wise / (CANDIDATES.len() * arm.body.dof()) as f64;
+    let mut tried = tried.into_iter();
+    let (best, name, left, p_value) = tried.next()?;
+    let is_sure = left <= 1.0 - rule.large_gain || p_value <= level;
+    if left > 1.0 - rule.least_gain || !is_sure {
+        return None;
+    }
+    let count = before.len() as f64 * best.problem.block() as f64;
+    let root = |squares: f64| (squares / count.max(1.0)).sqrt();
+    let total = before.iter().sum::<f64>();
+    let rivals: Vec<ServoRival> = tried
+        .map(|(_, other, share, _)| ServoRival {
+            effect: other.to_string(),
+            why_not: format!(
+                "leaves {:.0} % of the held-out squared error, not {:.0} %",
+                100.0 * share,
+                100.0 * left
+            ),
+        })
+        .collect();
+    let constants =
+        CANDIDATES.iter().find(|(own, _)| *own == name).map_or(&[][..], |(_, constants)| *constants);
+    let mut parameters = serde_json::Map::new();
+    for constant in constants {
+        let key = if *constant == Constant::Load { "coefficient" } else { constant.name() };
+        parameters.insert(key.to_string(), json!(best.problem.constants.of(*constant)));
+    }
+    let effect = ServoEffect {
+        effect: name,
+        joints: vec![number],
+        parameters,
+        rms_before: vec![root(total)],
+        rms_after: vec![root(left * total)],
+        p_value,
+        probability: 1.0 - p_value,
+        logs: Vec::new(),
+        leftover: left,
+        rivals,
+    };
+    Some((best, effect))
+}
+
+/// A joint with more constants free, from where it is.
+fn with<'l>(joint: &Joint<'l>, constants: &[Constant]) -> Joint<'l> {
+    let torque = joint.problem.constants.of(Constant::Torque);
+    let (mut values, mut free) = (joint.fitted.values.clone(), joint.free.clone());
+    let mut roles = joint.problem.roles.clone();
+    for constant in constants {
+        let (start, least) = match constant {
+            Constant::Load => (0.1, 0.0),
+            Constant::StribeckVelocity => (0.1, 5e-3),
+            _ => (0.02 * torque, 0.0),
+        };
+        roles.push(Role::Constant(*constant));
+        values.push(start);
+        free.push(Free { scale: start, least });
+    }
+    let mut problem = joint.problem.asking(roles);
+    let fitted = fit(&problem, &values, &free, STEPS);
+    let (constants, inertial, _) = problem.at(&fitted.values);
+    (problem.constants, problem.inertial) = (constants, inertial);
+    let std = vec![None; free.len()];
+    Joint { problem, fitted, free, std }
+}
+
+/// Sums of squared errors of blocks that count as independent, rad².
+fn block_squares(errors: &[Vec<f64>], block: usize) -> Vec<f64> {
+    errors.iter().flat_map(|own| own.chunks(block.max(1))).map(|b| b.iter().map(|r| r * r).sum()).collect()
+}
+
+/// The probability that blocks improve so much by chance: their mean change over its standard error, one side of Student's t.
+fn p_value(before: &[f64], after: &[f64]) -> f64 {
+    let changes: Vec<f64> = before.iter().zip(after).map(|(b, a)| b - a).collect();
+    let n = changes.len() as f64;
+    let mean = changes.iter().sum::<f64>() / n.max(1.0);
+    let variance = changes.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    if mean <= 0.0 || variance <= 0.0 {
+        return 1.0;
+    }
+    0.5 * f_tail(mean.powi(2) / (variance / n), 1.0, n - 1.0)
+}
+
+/// What single logs have on a joint.
+struct Odd<'o> {
+    /// The servo with all friction, in each log.
+    each: Vec<Problem<'o>>,
+    /// By log, those to fit first.
+    changes: Vec<Option<Change>>,
+    sizes: Vec<[Option<Size>; 2]>,
+}
+
+impl<'o> Odd<'o> {
+    /// Compared with the servo in the logs `like`.
+    fn in_logs(
+        arm: &ServoArm,
+        like: &[ServoLog],
+        (logs, validate): (&'o [ServoLog], &'o [ServoLog]),
+        j: usize,
+        rule: &Rule,
+    ) -> Result<Odd<'o>, IdentifyError> {
+        let joint = Joint::fit(arm, like, j)?;
+        let each = each_log(arm, &joint, (logs, validate), j);
+        let sizes = by_log::sizes(&each);
+        Ok(Odd { changes: by_log::odd(&sizes, rule), sizes, each })
+    }
+}
+
+/// A problem for each log, those to fit first.
+fn each_log<'o>(
+    arm: &ServoArm,
+    joint: &Joint<'_>,
+    (logs, validate): (&'o [ServoLog], &'o [ServoLog]),
+    j: usize,
+) -> Vec<Problem<'o>> {
+    let (fit, held_out) =
+        (joint.problem.in_logs(&arm.body, logs, j), joint.problem.in_logs(&arm.body, validate, j));
+    let own = (0..logs.len()).map(|k| fit.of_log(k));
+    own.chain((0..validate.len()).map(|k| held_out.of_log(k))).collect()
+}
+
+/// Names what single logs have, each change once for all logs that have it, and what is left with it.
+fn report_odd(
+    result: &mut ExplainedServos,
+    arm: &ServoArm,
+    joint: &Joint<'_>,
+    (logs, validate): (&[ServoLog], &[ServoLog]),
+    odd: &Odd<'_>,
+    j: usize,
+) {
+    let number = JointNumber::from_index(j);
+    let each = each_log(arm, joint, (logs, validate), j);
+    let mut left: Vec<Vec<Vec<f64>>> = each.iter().map(|problem| errors(problem, &[])).collect();
+    let is_odd: Vec<bool> = odd.changes.iter().map(Option::is_some).collect();
+    for (change, own) in by_log::groups(&odd.changes, &odd.sizes) {
+        let together = odd.each[own[0]].clone().and(own[1..].iter().map(|k| &odd.each[*k]));
+        let Some(size) = by_log::size(&together, change) else { continue };
+        let spread = by_log::spread(&odd.sizes, &is_odd, change) / (own.len() as f64).sqrt();
+        let std = size.std.hypot(spread).hypot(between(&odd.sizes, &own, change));
+        let (before, squares) = (rms_of(&left, &own), change_errors(&odd.each, &own, change, size.value));
+        own.iter().zip(squares).for_each(|(k, with)| left[*k] = with);
+        let freedom = together.blocks().saturating_sub(1).max(1) as f64;
+        let p_value = f_tail(((size.value - change.none()) / std).powi(2), 1.0, freedom);
+        let effect = ServoEffect {
+            effect: change.name(),
+            joints: vec![number],
+            parameters: parameters(arm, joint, change, (size.value, std), own.len()),
+            rms_before: vec![before],
+            rms_after: vec![rms_of(&left, &own)],
+            p_value,
+            probability: 1.0 - p_value,
+            logs: own.iter().map(|k| result.logs[*k].log.clone()).collect(),
+            leftover: size.left(),
+            rivals: rivals(&odd.sizes, &own, change),
+        };
+        for k in own {
+            let length = if k < logs.len() { &logs[k].t } else { &validate[k - logs.len()].t };
+            let share = 1.0 - odd.sizes[k][change as usize].map_or(1.0, |size| size.left());
+            result.logs[k].differs.push(Differs {
+                effect: change.name(),
+                joints: vec![number],
+                start_time: length.first().copied().unwrap_or(0.0),
+                end_time: length.last().copied().unwrap_or(0.0),
+                share,
+            });
+        }
+        result.effects.push(effect);
+    }
+    let (fit, held_out) = left.split_at(logs.len());
+    result.after.add(&fit.concat(), &held_out.concat());
+    let delay = joint.goal_delay();
+    let goal: Vec<Vec<f64>> =
+        each.iter().skip(logs.len()).flat_map(|problem| problem.goal_errors(delay)).collect();
+    result.goal_error.push(rms(&goal));
+}
+
+/// How far single logs of those that have a change are from each other, as the error of their mean.
+fn between(sizes: &[[Option<Size>; 2]], own: &[usize], change: Change) -> f64 {
+    let values: Vec<f64> = own.iter().filter_map(|k| Some(sizes[*k][change as usize]?.value)).collect();
+    let n = values.len() as f64;
+    if n < 2.0 {
+        return 0.0;
+    }
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt()
+}
+
+fn rms_of(left: &[Vec<Vec<f64>>], own: &[usize]) -> f64 {
+    rms(&own.iter().flat_map(|k| left[*k].iter().cloned()).collect::<Vec<_>>())
+}
+
+/// The errors of logs with a change of a size.
+fn change_errors(each: &[Problem<'_>], own: &[usize], change: Change, value: f64) -> Vec<Vec<Vec<f64>>> {
+    let with = |k: &usize| {
+        let kp = each[*k].constants.of(Constant::Kp);
+        match change {
+            Change::Payload => errors(&each[*k].asking(vec![Role::Payload]), &[value]),
+            Change::Gain => errors(&each[*k].asking(vec![Role::Constant(Constant::Kp)]), &[value * kp]),
+        }
+    };
+    own.iter().map(with).collect()
+}
+
+fn parameters(
+    arm: &ServoArm,
+    joint: &Joint<'_>,
+    change: Change,
+    (value, std): (f64, f64),
+    logs: usize,
+) -> serde_json::Map<String, serde_json::Value> {
+    let absolute = arm.known(joint.problem.joint).is_absolute();
+    let interval = [value - 1.96 * std, value + 1.96 * std];
+    let of = match change {
+        Change::Payload if absolute => json!({"mass": value, "mass_std": std, "mass_interval": interval,
+            "com": arm.tool, "start_time": vec![0.0; logs]}),
+        // Kilograms a newton metre of the torque at full duty.
+        Change::Payload => json!({"mass": null, "mass_for_torque": value, "mass_for_torque_std": std,
+            "com": arm.tool, "start_time": vec![0.0; logs]}),
+        Change::Gain => {
+            let kp = joint.problem.constants.of(Constant::Kp);
+            json!({"gain": value, "gain_std": std, "gain_interval": interval, "kp": value * kp})
+        }
+    };
+    of.as_object().cloned().unwrap_or_default()
+}
+
+fn rivals(sizes: &[[Option<Size>; 2]], own: &[usize], change: Change) -> Vec<ServoRival> {
+    let left = |change: Change| -> f64 {
+        let of = own.iter().filter_map(|k| sizes[*k][change as usize]);
+        let (after, before) = of.fold((0.0, 0.0), |(a, b), size| (a + size.after, b + size.before));
+        after / f64::max(before, f64::MIN_POSITIVE)
+    };
+    let others = Change::ALL.into_iter().filter(|other| *other != change);
+    others
+        .map(|other| ServoRival {
+            effect: other.name().to_string(),
+            why_not: format!(
+                "leaves {:.0} % of the squared error of these logs, not {:.0} %",
+                100.0 * left(other),
+                100.0 * left(change)
+            ),
+        })
+        .collect()
+}

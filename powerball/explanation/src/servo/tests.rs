@@ -1,0 +1,96 @@
+//! On measured logs of a servo: another gain is named, another mass is found, and nothing where nothing differs.
+
+use super::*;
+use servos::{GAINS, LENGTHS, MASSES, Measured, PATHS, pendulum, point};
+
+#[path = "../../../../tests/support/servos.rs"]
+mod servos;
+
+/// The logs of one repetition explain a load and gain, and these are judged: what is named in single logs.
+fn in_single_logs(measured: &Measured, own: (usize, f64, u32), validate: &[ServoLog]) -> Vec<ServoEffect> {
+    let ((name, mass), length, kp) = (MASSES[own.0], own.1, own.2);
+    let servos = ServoArm::new(&pendulum(length, &format!("kp = {kp}")), Some(&point(mass))).unwrap();
+    let logs = measured.logs((name, length, kp), 1);
+    let found = explain_servos(&servos, &logs, validate, &Rule::default(), Progress::default()).unwrap();
+    assert_eq!(found.before.validate.position_error.len(), 1);
+    found.effects.into_iter().filter(|effect| !effect.logs.is_empty()).collect()
+}
+
+/// Whether a log of another gain, and no other, is named with a gain within a third of the right one.
+fn names_the_gain(measured: &Measured, own: (usize, f64, u32), other: u32, path: &str) -> bool {
+    let of = (MASSES[own.0].0, own.1, own.2);
+    let mut validate: Vec<ServoLog> =
+        PATHS.iter().filter(|p| **p != path).map(|path| measured.log(of, path, 2)).collect();
+    validate.push(measured.log((of.0, of.1, other), path, 2));
+    let odd = validate[4].file.clone();
+    let found = in_single_logs(measured, own, &validate);
+    let right = f64::from(other) / f64::from(own.2);
+    let gain = |e: &ServoEffect| e.parameters.get("gain").and_then(serde_json::Value::as_f64).unwrap_or(0.0);
+    let good = matches!(found.as_slice(), [one] if one.effect == "torque_constant" && one.logs == [odd]
+        && (gain(one) / right).ln().abs() < 0.3);
+    if !good {
+        let said: Vec<_> = found.iter().map(|e| (e.effect, gain(e), e.logs.len())).collect();
+        println!("{} kg at {} m, kp {} to {other} in {path}: {said:?}", of.0, of.1, of.2);
+    }
+    good
+}
+
+#[test]
+fn another_gain_in_one_log_is_named_and_nothing_where_nothing_differs() {
+    let Some(measured) = Measured::unpack() else { return };
+    assert!(names_the_gain(&measured, (0, 0.15, 16), 32, "sin_sin"));
+    let same = measured.logs((MASSES[0].0, 0.15, 16), 2);
+    let found = in_single_logs(&measured, (0, 0.15, 16), &same);
+    assert!(found.is_empty(), "{found:?}");
+}
+
+#[test]
+#[ignore = "at_length: 250 explanations"]
+fn how_often_gains_and_masses_are_right() {
+    let Some(measured) = Measured::unpack() else { return };
+    let mut all = Vec::new();
+    for mass in 0..MASSES.len() {
+        LENGTHS.iter().for_each(|l| GAINS.iter().for_each(|kp| all.push((mass, *l, *kp))));
+    }
+    let (mut gains, mut of_gains, mut same) = (0, 0, 0);
+    for own in &all {
+        let others = GAINS.iter().filter(|kp| **kp != own.2).flat_map(|kp| PATHS.map(|path| (*kp, path)));
+        for (kp, path) in others {
+            (gains, of_gains) =
+                (gains + usize::from(names_the_gain(&measured, *own, kp, path)), of_gains + 1);
+        }
+        let logs = measured.logs((MASSES[own.0].0, own.1, own.2), 2);
+        same += usize::from(in_single_logs(&measured, *own, &logs).is_empty());
+    }
+    println!(
+        "gain named: {gains} of {of_gains}; nothing named where nothing differs: {same} of {}",
+        all.len()
+    );
+    let (mut near, mut held, mut count) = (0, 0, 0);
+    for own in &all {
+        let other = MASSES[1 - own.0];
+        let truth = other.1 - MASSES[own.0].1;
+        for k in 0..PATHS.len() {
+            let mut validate = measured.logs((MASSES[own.0].0, own.1, own.2), 2);
+            let three = (0..3).map(|i| PATHS[(k + i) % PATHS.len()]);
+            validate.extend(three.map(|path| measured.log((other.0, own.1, own.2), path, 2)));
+            let found = in_single_logs(&measured, *own, &validate);
+            let masses: Vec<&ServoEffect> = found.iter().filter(|e| e.effect == "payload").collect();
+            let of = |e: &ServoEffect, key: &str, at: usize| match &e.parameters[key] {
+                serde_json::Value::Array(both) => both[at].as_f64().unwrap_or(f64::NAN),
+                one => one.as_f64().unwrap_or(f64::NAN),
+            };
+            count += 1;
+            if let Some(one) = masses.first() {
+                let value = of(one, "mass", 0);
+                near += usize::from((value / truth - 1.0).abs() < 0.1);
+                let inside = of(one, "mass_interval", 0) <= truth && truth <= of(one, "mass_interval", 1);
+                held += usize::from(inside);
+                println!("{own:?} {k}: {value:.3} kg for {truth:.3}, in {} logs", one.logs.len());
+            } else {
+                println!("{own:?} {k}: no mass for {truth:.3} kg");
+            }
+        }
+    }
+    println!("mass from three logs within 10 %: {near} of {count}; interval holds it: {held} of {count}");
+}
