@@ -89,6 +89,7 @@ fn what_was_identified_is_in_a_copy_of_the_urdf() {
     let printed: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
     assert!(printed["friction"][1]["coulomb_std"].as_f64().is_some_and(|std| std > 0.0));
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    assert_eq!(printed["arm_file"], "arm.toml");
     let text = fs::read_to_string(folder.join("result/two.urdf")).unwrap();
     assert!(text.contains("<!-- kept as it is -->"));
     assert_eq!(fs::read_to_string(folder.join("two.urdf")).unwrap(), URDF);
@@ -231,7 +232,13 @@ fn an_arm_is_exported_for_each_simulator() {
         // In USD the base has a mass too.
         assert!(text.matches(masses).count() >= 2 && text.contains(friction), "{text}");
     }
+    // The result of a command names its arm file.
     refused("--for sdf identified.json -o arm.sdf", 2, "--arm ARM.toml");
+    let mut named = result.clone();
+    named["arm_file"] = "arm.toml".into();
+    put("named.json", &named);
+    notes("--for sdf named.json -o named.sdf");
+    assert_eq!(read("named.sdf"), read("arm.sdf"));
     fs::write(folder.join("mine.sdf"), "<sdf/>\n").unwrap();
     refused("--for sdf --arm arm.toml identified.json -o mine.sdf", 2, "--force");
     put("comparison.json", &serde_json::json!({"differ": true, "causes": []}));

@@ -22,6 +22,9 @@ pub struct Identified {
     pub unusable: Vec<String>,
     /// The arm's name.
     pub arm: String,
+    /// The arm file, as its path was given to the command; `None` for an arm in memory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub arm_file: Option<String>,
     /// What the columns of the logs are; `None` where only summaries were given, which hold no samples.
     pub conventions: Option<Conventions>,
     /// What is between the motors' torques and the links', by joint, where logs hold both.

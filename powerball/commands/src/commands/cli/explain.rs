@@ -115,6 +115,7 @@ impl Explain {
             (None, _) => {}
         }
         explained.warnings.splice(0..0, recorded.warnings);
+        explained.arm_file = Some(self.inputs.arm.display().to_string());
         progress.say("writing");
         self.write(&prepared.with_known(explained), verbosity)
     }

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// `identify` or `explain` found in the form of a simulator. What the form cannot hold is printed.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  powerball export --for ur out/explained.json -o payload.script\n  \
-    powerball export --for sdf --arm arm.toml out/identified.json -o arm.sdf")]
+    powerball export --for sdf out/identified.json -o arm.sdf")]
 pub(crate) struct Export {
     /// Whose form.
     #[arg(long = "for", value_enum, value_name = "FORM")]
@@ -21,7 +21,8 @@ pub(crate) struct Export {
     /// model.json, or explained.json next to its model.json.
     #[arg(value_name = "RESULT.json")]
     result: PathBuf,
-    /// The arm file (TOML) that the result was identified with: for sdf, usd and fmu.
+    /// The arm file (TOML) that the result was identified with, for sdf, usd and fmu. Default: the path in
+    /// identified.json or explained.json.
     #[arg(long, value_name = "ARM.toml")]
     arm: Option<PathBuf>,
     /// The file to write.

@@ -38,13 +38,15 @@ pub(super) struct ArmResult {
 impl ArmResult {
     /// Reads a result and the arm file.
     pub(super) fn read(result: &Path, arm: Option<&Path>) -> Result<ArmResult, Failure> {
-        let (file, text, result) = model_of(result)?;
+        let (file, text, result, recorded) = model_of(result)?;
+        let recorded = recorded.as_deref().filter(|path| path.is_file());
         let needed = || {
             let what =
-                "the result has no geometry: give the arm file that it was identified with (--arm ARM.toml)";
+                "names no arm file that is there: give the one that it was identified with (--arm ARM.toml)";
             Failure::Unusable(format!("{}: {what}", file.display()))
         };
-        let filed = Arm::read(arm.ok_or_else(needed)?).map_err(|e| Failure::Unusable(e.to_string()))?;
+        let path = arm.or(recorded).ok_or_else(needed)?;
+        let filed = Arm::read(path).map_err(|e| Failure::Unusable(e.to_string()))?;
         let read = ModelFile::parse(&text, &file).map_err(|e| Failure::Unusable(e.to_string()))?;
         if !read.model.arm.is_empty() && read.model.arm != filed.name {
             return Err(Failure::Unusable(format!(
@@ -94,8 +96,9 @@ impl ArmResult {
     }
 }
 
-/// The file with the model of a result, its text and its JSON: that next to explained.json is model.json.
-fn model_of(result: &Path) -> Result<(PathBuf, String, Value), Failure> {
+/// The file with the model of a result, its text and its JSON (for explained.json those of model.json next to it), and the
+/// arm file that the result names.
+fn model_of(result: &Path) -> Result<(PathBuf, String, Value, Option<PathBuf>), Failure> {
     let read = |path: &Path| -> Result<(String, Value), Failure> {
         let wrong = |what: String| Failure::Unusable(format!("{}: {what}", path.display()));
         let text = dyngen::file::text(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
@@ -108,12 +111,13 @@ fn model_of(result: &Path) -> Result<(PathBuf, String, Value), Failure> {
         let what = "compares two results: give identified.json or model.json of the arm that is meant";
         return Err(Failure::Refused(wrong(what)));
     }
+    let arm = json["arm_file"].as_str().map(PathBuf::from);
     match ["parameters", "friction", "effects"].map(|key| json[key].is_array()) {
-        [true, true, _] => Ok((result.to_path_buf(), text, json)),
+        [true, true, _] => Ok((result.to_path_buf(), text, json, arm)),
         [_, _, true] => {
             let path = result.with_file_name("model.json");
             let (text, json) = read(&path)?;
-            Ok((path, text, json))
+            Ok((path, text, json, arm))
         }
         _ => Err(Failure::Unusable(wrong("is neither identified.json, model.json nor explained.json"))),
     }

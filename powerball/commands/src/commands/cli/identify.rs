@@ -121,7 +121,8 @@ impl Identify {
         };
         output::make_folder(&self.out)?;
         let original = self.export.as_deref().map(|path| Original::read(path, &self.out)).transpose()?;
-        let identified = identify(&arm, &logs.log, &logs.validate, &options)?;
+        let mut identified = identify(&arm, &logs.log, &logs.validate, &options)?;
+        identified.arm_file = Some(self.arm.display().to_string());
         terminal.say("writing");
         let known = known.as_ref().map(|known| &known.model.additions);
         let files = report::identified::files(&identified, known).map_err(Failure::Refused)?;

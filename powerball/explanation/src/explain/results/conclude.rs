@@ -62,6 +62,7 @@ pub(crate) fn conclude(findings: Findings<'_>) -> Result<Explained, ExplainError
         verdict: verdict(study, &held_out_change, &after.validate, &floor, &dependencies),
         logs: logs(&findings, &at_rest),
         arm: study.data.body.arm().name.clone(),
+        arm_file: None,
         sliding: study.data.body.arm().joints.iter().map(|j| j.kind == JointKind::Prismatic).collect(),
         conventions: None,
         transmission: None,

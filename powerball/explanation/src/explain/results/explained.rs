@@ -32,6 +32,9 @@ pub struct Explained {
     pub logs: Vec<LogResult>,
     /// The arm's name.
     pub arm: String,
+    /// The arm file, as its path was given to the command; `None` for an arm in memory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub arm_file: Option<String>,
     /// Whether each joint slides: its torques are forces, N; not part of the JSON.
     #[serde(skip)]
     pub sliding: Vec<bool>,
