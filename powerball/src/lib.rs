@@ -15,7 +15,7 @@
 //! | [`virtual_arm`] | `virtual-arm` | yes | an arm to try all of it on |
 //! | [`procedure`] | `procedure` | yes | the paper's steps on a bus |
 //! | [`report`] | `report` | yes | pages and figures of results |
-//! | [`commands`] | `cli` | yes | the `powerball` command, its pages, the demo |
+//! | [`commands`] | `cli`; `offline` of it what needs files alone | yes | the `powerball` command, its pages, the demo |
 //!
 //! "The paper" is *Modeling and dynamic parameter identification of the SCHUNK Powerball robotic arm*;
 //! equations and tables that are cited by number are its own.
@@ -64,7 +64,7 @@
 #[cfg(feature = "driver")]
 #[doc(inline)]
 pub use powerball_bus as bus;
-#[cfg(feature = "demo")]
+#[cfg(any(feature = "demo", feature = "offline"))]
 #[doc(inline)]
 pub use powerball_commands::commands;
 #[cfg(feature = "procedure")]
