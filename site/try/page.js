@@ -14,22 +14,45 @@ const MODEL = { identify: "identified/identified.json", explain: "explained/mode
 
 const by = (id) => document.getElementById(id);
 const given = { arm: [], fit: [], validate: [] };
-let worker, running, model;
+let script, programs, worker, running, timer, model;
+
+// What the page is made of: read once, so that nothing is asked of the network later.
+
+async function fetched(name) {
+    const answer = await fetch(name);
+    if (!answer.ok) throw new Error(`${name}: the server answers ${answer.status}`);
+    return answer;
+}
+
+/** The bytes of NAME.gz, unpacked. */
+async function unpacked(name) {
+    const bytes = new Uint8Array(await (await fetched(`${name}.gz`)).arrayBuffer());
+    // Some servers have it unpacked on the way.
+    if (bytes[0] !== 0x1f || bytes[1] !== 0x8b) return bytes;
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+async function load() {
+    const texts = ["wasi.js", "worker.js"].map(async (name) => (await fetched(name)).text());
+    const modules = ["powerball", "dyngen"].map(async (name) => [name, await WebAssembly.compile(await unpacked(`${name}.wasm`))]);
+    script = URL.createObjectURL(new Blob(await Promise.all(texts), { type: "text/javascript" }));
+    programs = new Map(await Promise.all(modules));
+    start();
+    by("state").textContent = "The programs are loaded.";
+    document.body.dataset.ready = "yes";
+}
 
 // The worker.
 
 function start() {
-    worker = new Worker("worker.js", { type: "module" });
+    worker = new Worker(script);
     worker.onmessage = ({ data }) => heard(data);
-    worker.onerror = (e) => heard({ failed: e.message || "this browser cannot run it: it needs module workers and WebAssembly" });
+    worker.onerror = (e) => failed(e.message);
+    worker.postMessage({ programs });
 }
 
 function heard(data) {
-    if (data.ready) {
-        by("state").textContent = "The programs are loaded.";
-        document.body.dataset.ready = "yes";
-    }
-    if (data.sample) take(data.sample);
     if (data.said) running.said(data.said, data.text);
     if (data.ended !== undefined) running.end(data);
     if (data.failed) failed(data.failed);
@@ -40,6 +63,7 @@ function ran(program, words, show) {
     return new Promise((done) => {
         const text = { out: "", err: "" };
         running = {
+            text,
             said(stream, more) {
                 text[stream] += more;
                 show?.(text);
@@ -57,8 +81,8 @@ function ran(program, words, show) {
 function failed(why) {
     by("answer").hidden = false;
     by("progress").hidden = true;
-    by("errors").textContent = `The program ended without an answer: ${why}. Large logs may need more memory than a tab has: ` +
-        "give shorter logs, or install the command.";
+    by("errors").textContent = `${running?.text.err ?? ""}\nThe program ended without an answer: ${why}. Large logs may need ` +
+        "more memory than a tab has: give shorter logs, or install the command.";
     by("words").textContent = "";
     if (running) again();
 }
@@ -66,6 +90,7 @@ function failed(why) {
 /** Stops what runs: a new worker has the files that were given. */
 function again() {
     worker.terminate();
+    clearInterval(timer);
     running = undefined;
     idle(true);
     start();
@@ -89,11 +114,6 @@ async function give(kind, files) {
 async function read(list) {
     const files = await Promise.all([...list].map(async (file) => ({ name: file.name, bytes: new Uint8Array(await file.arrayBuffer()) })));
     return files.sort((a, b) => (a.name < b.name ? -1 : 1));
-}
-
-async function take(files) {
-    const of = (kind) => files.filter(({ name }) => SAMPLE[kind].includes(name));
-    for (const kind of Object.keys(SAMPLE)) await give(kind, of(kind));
 }
 
 /** The arm file: the given one, or what `dyngen import` makes of a model. */
@@ -141,8 +161,9 @@ function idle(is) {
     by("stop").hidden = is;
 }
 
-/** What a command reports while it runs is indented and ends with an ellipsis; the rest of it is for the reader. */
-const isProgress = (line) => /^ {2}.* …$/.test(line);
+/** What a command reports while it runs ends with an ellipsis, and may be written over; the rest of it is for the reader. */
+const lines = (err) => err.split("\n").map((line) => line.split(/\r|\x1b\[K/).at(-1));
+const isProgress = (line) => / …$/.test(line);
 
 async function asked(program, words, folder) {
     by("answer").hidden = false;
@@ -154,11 +175,12 @@ async function asked(program, words, folder) {
     const began = performance.now();
     let doing = "reading";
     const tick = () => (by("progress").lastElementChild.textContent = `${doing} … ${Math.round((performance.now() - began) / 1000)} s`);
-    const timer = setInterval(tick, 500);
+    timer = setInterval(tick, 500);
     tick();
-    if (folder) worker.postMessage({ remove: folder });
+    // Results of before are gone, so that what is offered is of this command.
+    if (folder) worker.postMessage({ remove: folder, folder });
     const answer = await ran(program, words, ({ err }) => {
-        doing = err.split("\n").filter(isProgress).at(-1)?.slice(2, -2) || doing;
+        doing = lines(err).filter(isProgress).at(-1)?.slice(0, -2) || doing;
         tick();
     });
     clearInterval(timer);
@@ -173,7 +195,7 @@ function shown({ code, seconds, files, out, err }, folder) {
     by("meaning").className = `note ${tone}`;
     by("meaning").textContent = `${meaning} Exit code ${code}, ${seconds.toFixed(1)} s.`;
     by("words").textContent = out.trimEnd();
-    by("errors").textContent = err.split("\n").filter((line) => !isProgress(line)).join("\n").trimEnd();
+    by("errors").textContent = lines(err).filter((line) => !isProgress(line)).join("\n").trimEnd();
     document.querySelectorAll("#downloads a").forEach((link) => URL.revokeObjectURL(link.href));
     const made = files.filter(({ path }) => !Object.values(given).flat().some((file) => file.path === path));
     by("downloads").replaceChildren(...made.filter(({ path }) => inside(path, folder)).map(download));
@@ -201,8 +223,6 @@ async function ask(question) {
 async function code(language) {
     const rust = ["generate", "--arm", armFile(), "--model", model, "-o", "code/controller.rs", "--c-header", "code/controller.h"];
     const c = ["generate", armFile(), "--language", "c", "-o", "code/arm.c"];
-    worker.postMessage({ remove: "code" });
-    worker.postMessage({ folder: "code" });
     await (language === "rust" ? asked("powerball", rust, "code") : asked("dyngen", c, "code"));
     by("generate").hidden = false;
 }
@@ -223,7 +243,12 @@ for (const place of document.querySelectorAll(".drop")) {
         give(kind, await read(event.dataTransfer.files));
     };
 }
-by("sample").onclick = () => worker.postMessage({ sample: Object.values(SAMPLE).flat() });
+by("sample").onclick = async () => {
+    for (const [kind, names] of Object.entries(SAMPLE)) {
+        const read = async (name) => ({ name, bytes: await unpacked(`sample/${name}`) });
+        await give(kind, await Promise.all(names.map(read)));
+    }
+};
 by("import-again").onclick = () => imported();
 by("stop").onclick = () => {
     again();
@@ -232,4 +257,9 @@ by("stop").onclick = () => {
 };
 document.querySelectorAll(".ask").forEach((button) => (button.onclick = () => ask(button.dataset.ask)));
 document.querySelectorAll("#generate button").forEach((button) => (button.onclick = () => code(button.dataset.code)));
-start();
+idle(false);
+by("stop").hidden = true;
+load().then(
+    () => idle(true),
+    (e) => (by("state").textContent = `They cannot be loaded: ${e.message}`),
+);

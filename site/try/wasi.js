@@ -1,6 +1,6 @@
 // A machine for one run of a command: files in memory, arguments, a clock and random bytes, behind the calls of WASI
 // (wasi_snapshot_preview1) that Rust's standard library makes. There is no network and no file of the computer behind it.
-// Works in a worker of a browser and in node alike.
+// worker.js stands behind it in one script.
 
 const ERRNO = { SUCCESS: 0, BADF: 8, EXIST: 20, INVAL: 28, ISDIR: 31, NOENT: 44, NOSYS: 52, NOTDIR: 54, NOTEMPTY: 55, SPIPE: 70 };
 const KIND = { UNKNOWN: 0, TERMINAL: 2, FOLDER: 3, FILE: 4 };
@@ -10,7 +10,7 @@ const APPEND = 1;
 const ROOT = 3;
 
 /** The files of the machine by absolute path. A folder is there with its own path. */
-export class Files {
+class Files {
     constructor() {
         this.nodes = new Map([["/", { folder: true }]]);
     }
@@ -88,7 +88,7 @@ class Exit {
  * @param said called with "out" or "err" and text as it is written
  * @returns the exit code
  */
-export function run(module, words, files, said) {
+function run(module, words, files, said) {
     const machine = new Machine(words, files, said);
     const calls = {};
     for (const { name } of WebAssembly.Module.imports(module)) {
