@@ -118,15 +118,13 @@ fn pages_and_help_are_in_plain_words() {
     for page in ["README.md", "KNOWN_GAPS.md"].map(String::from).into_iter().chain(pages) {
         texts.push((page.clone(), read(&page).split("```").step_by(2).collect::<String>()));
     }
-    let commands = "powerball/commands/src/commands/cli";
-    for folder in [commands, &format!("{commands}/bus"), "dyngen/src/cli"] {
-        for entry in std::fs::read_dir(root().join(folder)).unwrap() {
-            let file = format!("{folder}/{}", entry.unwrap().file_name().to_string_lossy());
-            if file.ends_with(".rs") {
-                let help = read(&file).lines().filter_map(|line| line.trim().strip_prefix("///")).collect();
-                texts.push((file, help));
-            }
-        }
+    let mut commands = Vec::new();
+    for folder in ["powerball/commands/src/commands/cli", "dyngen/src/cli"] {
+        sources(folder, &mut commands);
+    }
+    for file in commands {
+        let help = read(&file).lines().filter_map(|line| line.trim().strip_prefix("///")).collect();
+        texts.push((file, help));
     }
     let wrong: Vec<String> = texts.iter().flat_map(|(name, text)| not_plain(name, text, PLAIN)).collect();
     assert!(texts.len() > 40 && wrong.is_empty(), "{}", wrong.join("\n"));

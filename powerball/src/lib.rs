@@ -20,7 +20,7 @@
 //! | [`virtual_arm`] | `virtual-arm` | yes | a simulated arm on a bus |
 //! | [`procedure`] | `procedure` | yes | the paper's steps on a bus |
 //! | [`report`] | `report` | yes | pages and figures of results |
-//! | [`commands`] | `cli` | yes | the `powerball` command, the demo |
+//! | [`commands`] | `cli`; `offline` for the commands that need only files | yes | the `powerball` command, the demo |
 //!
 //! "The paper" is *Modeling and dynamic parameter identification of the SCHUNK Powerball robotic arm*;
 //! equations and tables that are cited by number are its own.
@@ -69,7 +69,7 @@
 #[cfg(feature = "driver")]
 #[doc(inline)]
 pub use powerball_bus as bus;
-#[cfg(feature = "demo")]
+#[cfg(any(feature = "demo", feature = "offline"))]
 #[doc(inline)]
 pub use powerball_commands::commands;
 #[cfg(feature = "procedure")]

@@ -21,7 +21,7 @@ pub struct Load {
 
 /// Whose controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[cfg_attr(feature = "offline", derive(clap::ValueEnum))]
 pub enum Form {
     /// Franka: endeffector-config.json of an end effector.
     Franka,

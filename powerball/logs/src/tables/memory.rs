@@ -5,8 +5,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Bytes that a log may take in this process; 0 where none was set.
 static ALLOWED: AtomicU64 = AtomicU64::new(0);
-/// Bytes that a log may take where none was set and the system does not report what is free.
-const ELSEWHERE: u64 = 4_000_000_000;
+/// Bytes that a log may take where none was set and the system does not report what is free; a browser has at
+/// most 4 GB in all.
+const ELSEWHERE: u64 = if cfg!(target_pointer_width = "32") { 1_000_000_000 } else { 4_000_000_000 };
 /// A table of more columns is not a log: an arm has some dozens, and a recording of a whole robot some
 /// hundreds.
 const MOST_COLUMNS: usize = 10_000;

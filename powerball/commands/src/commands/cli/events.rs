@@ -4,7 +4,8 @@
 //! arm. Nothing waits for the disk: a separate thread writes lines, and lines are lost rather than a cycle
 //! delayed.
 
-use super::{Failure, output};
+use super::Failure;
+use super::output::{SHOWN, Verbosity};
 use clap::Args;
 use std::fmt;
 use std::fs::OpenOptions;
@@ -19,18 +20,9 @@ use tracing_subscriber::layer::{Layer, SubscriberExt};
 use tracing_subscriber::registry::LookupSpan;
 use tracing_subscriber::util::SubscriberInitExt;
 
-/// The target of events whose words stand on standard error anyhow: how far a computation has come, and how it ended.
-pub(super) const SHOWN: &str = "powerball::shown";
-
 /// Which events are seen, and where.
 #[derive(Args, Clone, Debug)]
 pub(super) struct Events {
-    /// Print more: what is done with the arm, on standard error, and every note and all evidence of a result.
-    #[arg(short, long, global = true, conflicts_with = "quiet")]
-    verbose: bool,
-    /// Print nothing but errors.
-    #[arg(short, long, global = true)]
-    quiet: bool,
     /// Add events to this file, a JSON object each (time, level, message), or send them to `journald`. RUST_LOG says
     /// which: info, debug (each drive's state too), warn.
     #[arg(long, global = true, value_name = "FILE|journald")]
@@ -38,14 +30,10 @@ pub(super) struct Events {
 }
 
 impl Events {
-    pub(super) fn verbosity(&self) -> output::Verbosity {
-        output::Verbosity { verbose: self.verbose, quiet: self.quiet }
-    }
-
     /// Begins to listen. The returned guards write the remaining lines when they are dropped, and must live
     /// until the program ends.
-    pub(super) fn listen(&self) -> Result<Vec<WorkerGuard>, Failure> {
-        let level = match (self.quiet, self.verbose) {
+    pub(super) fn listen(&self, verbosity: Verbosity) -> Result<Vec<WorkerGuard>, Failure> {
+        let level = match (verbosity.quiet, verbosity.verbose) {
             (true, _) => "error",
             (_, true) => "info",
             _ => "warn",

@@ -3,34 +3,27 @@
 //! Also here: what `explain` prints.
 
 use super::Failure;
-use super::bus::{Consent, Where, virtual_bus};
 use super::inputs::{Inputs, recorded, sources};
+#[cfg(feature = "cli")]
+use super::online::experiment::Experiment;
 use super::output::{self, Accept, Progress, Verbosity, notes};
 use super::servos::{self, Masses};
-use crate::procedure::{Envelope, RecordError, record};
 use crate::report;
 use crate::report::explained::{change, nothing_named};
 use crate::report::number;
 use clap::Args;
 use dyngen::Arm;
-use powerball_bus::driver::lwa4p::LWA4P;
-use powerball_bus::transport::{Bus, BusUrl};
 use powerball_controller::JointNumber;
-use powerball_explanation::experiment::{self, TRAJECTORY};
+#[cfg(feature = "cli")]
+use powerball_explanation::experiment;
+use powerball_explanation::experiment::TRAJECTORY;
 use powerball_explanation::explain::{Explained, FalsePositives, NamedEffect, Rival, Unattributed, Verdict};
 use powerball_explanation::torque_model::TorqueModel;
 use powerball_explanation::{ExplainError, ExplainOptions, Prepared};
 use powerball_identification::Source;
-use powerball_identification::mounting::Mounting;
 use powerball_logs as logs;
-use powerball_logs::log::{Log, read_logs};
 use powerball_logs::motion::Motion;
-use powerball_virtual_arm::Undeclared;
 use std::path::{Path, PathBuf};
-
-/// Said where an experiment has nothing to tell apart.
-const NOTHING_OPEN: &str = "--experiment: nothing was recorded: these logs leave no names open that a path \
-    within the arm file's limits could tell apart";
 
 /// Find, name and add what the model lacks on logs; every addition is judged on another path.
 ///
@@ -56,10 +49,6 @@ pub(crate) struct Explain {
     /// are removed from the logs unchanged; what is found is added.
     #[arg(long, value_name = "FILE.json")]
     model: Option<PathBuf>,
-    /// Where two names fit equally well, record the experiment that tells them apart, and explain again with
-    /// its log.
-    #[arg(long)]
-    experiment: bool,
     /// Print how long each phase took, on standard error.
     #[arg(long)]
     timings: bool,
@@ -67,29 +56,24 @@ pub(crate) struct Explain {
     accept: Accept,
     #[command(flatten)]
     masses: Masses,
-    /// The bus that the arm of the experiment is on.
-    #[arg(long, value_name = "URL", default_value = "virtual", requires = "experiment")]
-    bus: BusUrl,
-    /// What is undeclared in the virtual arm, where it is on --bus virtual: as `powerball demo` writes it;
-    /// without, the file virtual_arm.json next to the arm file.
-    #[arg(long, value_name = "FILE", requires = "experiment")]
-    plant: Option<PathBuf>,
+    #[cfg(feature = "cli")]
     #[command(flatten)]
-    consent: Consent,
+    experiment: Experiment,
 }
 
 impl Explain {
     pub(crate) fn run(self, verbosity: Verbosity) -> Result<(), Failure> {
         let progress = Progress::timed(self.timings);
-        let experiment = if self.experiment { Some(self.arm()?) } else { None };
         let arm = Arm::read(&self.inputs.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
         let [fit, validate] = sources(&self.inputs, &self.validate)?;
         if servos::are_of_servos(&fit, &arm) {
             return self.servos((&fit, &validate), &arm, &progress, verbosity);
         }
+        #[cfg(feature = "cli")]
+        let opened = self.experiment.opened(&self.inputs)?;
         let known = self.model.as_deref().map(TorqueModel::read).transpose();
         let known = known.map_err(|e| Failure::Unusable(e.to_string()))?;
-        let mut recorded = recorded(&self.inputs, &self.validate, &arm, &progress)?;
+        let recorded = recorded(&self.inputs, &self.validate, &arm, &progress)?;
         let say = |what: &str| progress.say(what);
         let options =
             ExplainOptions { known, progress: logs::Progress::to(&say), ..ExplainOptions::default() };
@@ -97,22 +81,20 @@ impl Explain {
         let prepared = Prepared::new(&arm, &recorded.fit, &recorded.validate, &options).map_err(refused)?;
         let (mut explained, motion) = prepared.explained(&options).map_err(refused)?;
         self.write_trajectory(motion.as_ref())?;
-        match (experiment, motion) {
-            (Some((bus, note)), Some(motion)) => {
-                progress.say("recording the experiment");
-                let (new, notes) = self.recorded(&motion, bus, &arm)?;
-                recorded.warnings.extend(notes.into_iter().chain(note));
-                let old = (prepared.logs.as_slice(), prepared.validate.as_slice());
-                for new in prepared.without_known(new) {
-                    explained =
-                        experiment::learn(&prepared.body, old, new, &explained, &options).map_err(refused)?;
-                }
+        #[cfg(feature = "cli")]
+        if let Some(opened) = opened {
+            let (new, notes) = opened.recorded(motion.as_ref(), &arm, &self.inputs.out, &progress)?;
+            let old = (prepared.logs.as_slice(), prepared.validate.as_slice());
+            for new in prepared.without_known(new) {
+                explained =
+                    experiment::learn(&prepared.body, old, new, &explained, &options).map_err(refused)?;
+            }
+            if motion.is_some() {
                 // What is still open may ask for another experiment.
                 let next = experiment::propose(&prepared.body, &mut explained, &options);
                 self.write_trajectory(next.as_ref())?;
             }
-            (Some(_), None) => recorded.warnings.push(NOTHING_OPEN.to_string()),
-            (None, _) => {}
+            explained.warnings.splice(0..0, notes);
         }
         explained.warnings.splice(0..0, recorded.warnings);
         explained.arm_file = Some(self.inputs.arm.display().to_string());
@@ -128,7 +110,11 @@ impl Explain {
         progress: &Progress,
         verbosity: Verbosity,
     ) -> Result<(), Failure> {
-        if self.model.is_some() || self.experiment {
+        #[cfg(feature = "cli")]
+        let experiment = self.experiment.is_requested();
+        #[cfg(not(feature = "cli"))]
+        let experiment = false;
+        if self.model.is_some() || experiment {
             return Err(Failure::Unusable(
                 "--model and --experiment take logs with torques; these are of position servos (goal1 … and no torque)".into(),
             ));
@@ -173,70 +159,6 @@ impl Explain {
             }
             _ => Failure::Refused(e.to_string()),
         }
-    }
-}
-
-impl Explain {
-    /// The bus of the experiment, opened before any work is done, and what there is to report about it.
-    fn arm(&self) -> Result<(Box<dyn Bus>, Option<String>), Failure> {
-        if self.bus != BusUrl::Virtual {
-            if self.plant.is_some() {
-                return Err(Failure::Unusable("--plant is for --bus virtual".to_string()));
-            }
-            return Ok((self.place().open()?, None));
-        }
-        let Some(file) = self.plant.clone().or_else(|| Undeclared::next_to(&self.inputs.arm)) else {
-            let note = "the experiment was recorded on the built-in virtual arm, which has no undeclared \
-                effect: it says \
-                        nothing of another arm; name that one's bus by --bus, or the virtual arm's file by \
-                        --plant";
-            return Ok((self.place().open()?, Some(note.to_string())));
-        };
-        let arm = Undeclared::read(&file).map_err(Failure::Unusable)?.arm([0.0; 6], 1, false);
-        let note = format!("the experiment was recorded on the virtual arm of {}", file.display());
-        Ok((virtual_bus(arm.map_err(|e| Failure::Refused(e.to_string()))?)?, Some(note)))
-    }
-
-    fn place(&self) -> Where {
-        Where { bus: self.bus.clone(), json: self.inputs.json }
-    }
-
-    /// Records the experiment and reads its log, with what is to be reported about that.
-    fn recorded(
-        &self,
-        motion: &Motion,
-        bus: Box<dyn Bus>,
-        arm: &Arm,
-    ) -> Result<(Vec<Log>, Vec<String>), Failure> {
-        let file = self.inputs.out.join("experiment.csv");
-        self.record(motion, bus, arm, &file)?;
-        let (new, findings) = read_logs(&[&file], arm).map_err(|e| Failure::Refused(e.to_string()))?;
-        Ok((new, findings.iter().map(ToString::to_string).collect()))
-    }
-
-    fn record(&self, motion: &Motion, bus: Box<dyn Bus>, arm: &Arm, file: &Path) -> Result<(), Failure> {
-        if motion.dof() != LWA4P.joints.len() {
-            return Err(Failure::Unusable(format!(
-                "--experiment: the driver's arm has {} joints, the arm file has {}; {TRAJECTORY} is written, \
-                    record it with the \
-                 arm's own driver",
-                LWA4P.joints.len(),
-                motion.dof()
-            )));
-        }
-        // Nothing stands around a simulated arm.
-        let envelope = match self.bus {
-            BusUrl::Virtual => Envelope::new(|_| None),
-            _ => Envelope::of(arm, &Mounting::Filed, None, None)
-                .map_err(|e| Failure::Unusable(format!("--experiment: {e}")))?,
-        };
-        let master = self.place().driver(bus, self.consent)?;
-        let mut log = std::fs::File::create(file)
-            .map_err(|e| Failure::Unusable(format!("{}: cannot be written: {e}", file.display())))?;
-        record(master, motion, envelope, output::live(), &mut log).map(|_| ()).map_err(|e| match e {
-            RecordError::Write(_) => Failure::Unusable(e.to_string()),
-            other => Failure::Refused(format!("the experiment was not recorded: {other}")),
-        })
     }
 }
 

@@ -5,10 +5,7 @@ use super::{Failure, output, replace};
 use crate::report::inspected;
 use clap::{Args, ValueEnum};
 use dyngen::Arm;
-use powerball_explanation::torque_model::ModelFile;
-use powerball_identification::{Source, VerifyOptions, verify};
 use powerball_logs::log::{Inspected, InspectedTable, Log, inspect};
-use powerball_logs::tables::{JointState, McapWriter, layouts};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -207,23 +204,13 @@ fn table_lines(table: &InspectedTable, lines: &mut Vec<String>) {
 pub(super) fn write(log: &Log, arm: &Arm, model: Option<&Path>, out: &Path) -> Result<(), Failure> {
     replace::check_log(out, &[Path::new(&log.file)])?;
     let failed = |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", out.display()));
-    let Some(model) = model else { return log.write_for(out, &joint_names(arm)).map_err(failed) };
-    let model = ModelFile::read(model).map_err(|e| Failure::Unusable(e.to_string()))?;
-    // Times along the log, and measured, predicted and residual torque there, by joint.
-    let mut torque: Vec<Vec<[f64; 4]>> = vec![Vec::new(); arm.dof()];
-    for piece in log.whole_pieces() {
-        let start = piece.t.first().copied().unwrap_or(0.0);
-        let verified = verify(arm, &model, [Source::from(piece)], &VerifyOptions::default())?;
-        for (rows, curve) in torque.iter_mut().zip(&verified.curves) {
-            let at = curve.t.iter().zip(&curve.measured).zip(&curve.before);
-            rows.extend(at.map(|((t, measured), left)| [start + t, *measured, measured - left, *left]));
-        }
+    match model {
+        None => log.write_for(out, &joint_names(arm)).map_err(failed),
+        #[cfg(feature = "cli")]
+        Some(model) => super::log_with_model::write(log, arm, model, out),
+        #[cfg(not(feature = "cli"))]
+        Some(_) => Err(failed(std::io::Error::other("MCAP is not built into this program"))),
     }
-    let mut bytes = Vec::new();
-    mcap(log, &joint_names(arm), &torque, &mut bytes).map_err(failed)?;
-    super::output::write_file(out, &bytes)?;
-    let held = layouts::Held { joints: &joint_names(arm), velocities: false, torques: true };
-    layouts::write(out, held).map_err(failed)
 }
 
 /// The names of an arm's joints in an MCAP: those of the arm file, else `joint1` and so on.
@@ -232,31 +219,4 @@ pub(super) fn joint_names(arm: &Arm) -> Vec<String> {
         true => arm.joint_names(),
         false => (1..=arm.dof()).map(|j| format!("joint{j}")).collect(),
     }
-}
-
-fn mcap(log: &Log, joints: &[String], torque: &[Vec<[f64; 4]>], out: &mut Vec<u8>) -> std::io::Result<()> {
-    let members = ["measured", "predicted", "residual"];
-    let mut writer = McapWriter::new(out)?;
-    let states = writer.joint_states("/joint_states")?;
-    let channels: Vec<_> = joints
-        .iter()
-        .map(|joint| writer.numbers(&format!("/torque/{joint}"), "Torque", &members))
-        .collect::<Result<_, _>>()?;
-    for (k, t) in log.t.iter().enumerate() {
-        let of = |signals: &[Vec<f64>]| signals.iter().map(|x| x[k]).collect::<Vec<f64>>();
-        let (position, effort) = (of(&log.q), of(&log.torque));
-        writer.state(
-            states,
-            *t,
-            joints,
-            &JointState { position: &position, velocity: &[], effort: &effort },
-        )?;
-    }
-    for (channel, rows) in channels.into_iter().zip(torque) {
-        for [t, measured, predicted, residual] in rows {
-            let values = members.into_iter().zip([*measured, *predicted, *residual]);
-            writer.object(channel, *t, values)?;
-        }
-    }
-    writer.finish().map(|_| ())
 }

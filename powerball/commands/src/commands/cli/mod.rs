@@ -1,40 +1,32 @@
 //! The `powerball` command: one file a subcommand.
+//!
+//! With the feature `offline` alone it has what needs files and nothing else, and runs in a browser.
 
-mod bus;
 mod compare;
-mod demo;
-mod envelope;
+#[cfg(feature = "cli")]
 mod events;
 mod excite;
 mod explain;
 mod export;
 mod exported_arm;
-mod float;
 mod fmu;
-mod follow;
-mod friction;
 mod generate;
 mod identify;
 mod inputs;
-mod listen;
-mod live_server;
 mod log;
-mod model_on_bus;
+#[cfg(feature = "cli")]
+mod log_with_model;
+#[cfg(feature = "cli")]
+mod online;
 mod output;
-mod profile;
-mod record;
 mod replace;
-mod serve;
 mod servos;
+#[cfg(feature = "cli")]
 mod shell;
 mod summarize;
 mod verify;
-mod virtual_arm;
-mod warm_up;
-mod watch;
 
 use clap::{Parser, Subcommand};
-use events::Events;
 use powerball_identification::IdentifyError;
 use std::process::ExitCode;
 
@@ -45,7 +37,10 @@ struct Cli {
     #[command(subcommand)]
     command: Command,
     #[command(flatten)]
-    events: Events,
+    verbosity: output::Verbosity,
+    #[cfg(feature = "cli")]
+    #[command(flatten)]
+    events: events::Events,
     /// Write over files that this command may not have made, and over logs.
     #[arg(long, global = true)]
     force: bool,
@@ -53,24 +48,9 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// The whole loop on the built-in virtual arm: record, identify, explain, compare with the truth.
-    Demo(demo::DemoCommand),
-    /// Look at the drives on a CAN bus, read and write their objects, enable, stop and move them.
-    Bus(bus::BusCommand),
-    /// Put the virtual arm on a bus for others.
-    VirtualArm(virtual_arm::VirtualArmCommand),
-    /// Follow a trajectory on a bus and log it.
-    Record(record::RecordCommand),
-    /// Follow a trajectory with a torque model; tracking error with it and with a base model. Never run on hardware.
-    Follow(follow::FollowCommand),
-    /// Take weight and friction off the hand that guides the arm. Never run on hardware.
-    Float(float::FloatCommand),
-    /// Swing the arm until its friction has settled.
-    WarmUp(warm_up::WarmUp),
-    /// Measure every joint's friction at constant velocities and fit its law.
-    Friction(friction::Friction),
-    /// Make an arm's constant tables for the bus driver from its drives' DCF and one TOML.
-    Profile(profile::ProfileCommand),
+    #[cfg(feature = "cli")]
+    #[command(flatten)]
+    Online(online::Command),
     /// Show what is in log files and what they are taken to be.
     Log(log::LogCommand),
     /// Search an exciting trajectory within the arm's limits and write it.
@@ -91,26 +71,35 @@ enum Command {
     Generate(generate::Generate),
     /// Write what was found in another program's form: a load for a robot's controller, the arm for a simulator.
     Export(export::Export),
-    /// Report when a model no longer holds, along logs or a stream: since when, on which joints and why.
-    Watch(watch::WatchCommand),
+    #[cfg(feature = "cli")]
     /// Print what completes this program's words in a shell.
     Completions(shell::Completions),
+    #[cfg(feature = "cli")]
     /// Write man pages of this program and its commands.
     Man(shell::Man),
+}
+
+impl Cli {
+    /// Runs the command; what happens meanwhile is seen where `--events` says.
+    fn run(self) -> Result<(), Failure> {
+        #[cfg(feature = "cli")]
+        let _written_before_the_end = {
+            // Where signals cannot be listened to, a limit ends the program as it does any other.
+            let _ = powerball_bus::transport::file_limit_is_an_error();
+            self.events.listen(self.verbosity)?
+        };
+        tracing::info!(target: output::SHOWN, version = env!("CARGO_PKG_VERSION"), "{}", output::command_line());
+        let done = self.command.run(self.verbosity);
+        record_end(&done);
+        done
+    }
 }
 
 impl Command {
     fn run(self, verbosity: output::Verbosity) -> Result<(), Failure> {
         match self {
-            Command::Demo(command) => command.run(),
-            Command::Bus(command) => command.run(),
-            Command::VirtualArm(command) => command.run(),
-            Command::Record(command) => command.run(),
-            Command::Follow(command) => command.run(),
-            Command::Float(command) => command.run(),
-            Command::WarmUp(command) => command.run(),
-            Command::Friction(command) => command.run(),
-            Command::Profile(command) => command.run(),
+            #[cfg(feature = "cli")]
+            Command::Online(command) => command.run(),
             Command::Log(command) => command.run(),
             Command::Excite(command) => command.run(),
             Command::Identify(command) => command.run(verbosity),
@@ -121,8 +110,9 @@ impl Command {
             Command::Explain(command) => command.run(verbosity),
             Command::Generate(command) => command.run(),
             Command::Export(command) => command.run(),
-            Command::Watch(command) => command.run(),
+            #[cfg(feature = "cli")]
             Command::Completions(command) => command.run(),
+            #[cfg(feature = "cli")]
             Command::Man(command) => command.run(),
         }
     }
@@ -131,14 +121,14 @@ impl Command {
 /// The last event: how it ended. A person reads it on standard error anyhow.
 fn record_end(done: &Result<(), Failure>) {
     match done {
-        Ok(()) => tracing::info!(target: events::SHOWN, exit = 0, "done"),
+        Ok(()) => tracing::info!(target: output::SHOWN, exit = 0, "done"),
         Err(failure @ Failure::Negative) => {
-            tracing::info!(target: events::SHOWN, exit = failure.code(), "done")
+            tracing::info!(target: output::SHOWN, exit = failure.code(), "done")
         }
         Err(failure @ Failure::Doubtful(reason)) => {
-            tracing::warn!(target: events::SHOWN, exit = failure.code(), "{reason}");
+            tracing::warn!(target: output::SHOWN, exit = failure.code(), "{reason}");
         }
-        Err(failure) => tracing::error!(target: events::SHOWN, exit = failure.code(), "{}", failure.reason()),
+        Err(failure) => tracing::error!(target: output::SHOWN, exit = failure.code(), "{}", failure.reason()),
     }
 }
 
@@ -152,6 +142,7 @@ pub(crate) enum Failure {
     /// The result is written and should not be built on: exit code 3.
     Doubtful(String),
     /// What was asked is not so, and that was printed: exit code 1.
+    #[cfg_attr(not(feature = "cli"), expect(dead_code, reason = "`watch` alone answers so"))]
     Negative,
 }
 
@@ -186,21 +177,10 @@ pub fn main() -> ExitCode {
     // clap itself exits with 2 on wrong use.
     let cli = Cli::parse();
     crate::report::sign(output::signature());
-    // Where signals cannot be listened to, a limit ends the program as it does any other.
-    let _ = powerball_bus::transport::file_limit_is_an_error();
     if cli.force {
         replace::replace_all();
     }
-    let listening = cli.events.listen();
-    tracing::info!(target: events::SHOWN, version = env!("CARGO_PKG_VERSION"), "{}", output::command_line());
-    let done = listening.and_then(|guards| {
-        let done = cli.command.run(cli.events.verbosity());
-        record_end(&done);
-        // All lines are written before the program ends.
-        drop(guards);
-        done
-    });
-    match done {
+    match cli.run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             if !failure.reason().is_empty() {

@@ -1,11 +1,8 @@
 //! Results on disk and on the terminal.
 
-use super::events::SHOWN;
 use super::{Failure, replace};
-use crate::procedure::MotionLog;
 use crate::report::{Files, band_of, files};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use powerball_controller::JointNumber;
 use powerball_identification::conventions::Conventions;
 use powerball_identification::estimate::ResidualStats;
@@ -13,6 +10,9 @@ use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
+
+/// The target of events whose words stand on standard error anyhow: how far a computation has come, and how it ended.
+pub(super) const SHOWN: &str = "powerball::shown";
 
 /// What a command is doing, on standard error: as it happens where a person looks at it, and as a table of
 /// times at its end where `--timings` asks for one.
@@ -35,14 +35,14 @@ impl Phase {
 }
 
 /// Processor time that this program has taken, all its threads together.
-#[cfg(unix)]
+#[cfg(all(unix, feature = "cli"))]
 fn processor() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec.try_into().unwrap_or(0))
 }
 
 /// Processor time is not known here.
-#[cfg(not(unix))]
+#[cfg(not(all(unix, feature = "cli")))]
 fn processor() -> Duration {
     Duration::ZERO
 }
@@ -100,29 +100,6 @@ fn times(phases: &[Phase]) -> String {
     text
 }
 
-/// A line on standard error, where a person looks at it, that is written over by the next one and cut at the terminal's
-/// width: how far a motion has come. The last one stays.
-pub(crate) fn live<T: std::fmt::Display>() -> impl FnMut(&T) {
-    let line = ProgressBar::no_length().with_style(
-        ProgressStyle::with_template("  {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner()),
-    );
-    let line = line.with_finish(ProgressFinish::AndLeave);
-    move |what| line.set_message(what.to_string())
-}
-
-/// Begins the log of a motion in a folder for results.
-pub(crate) fn motion_log(folder: &Path) -> Result<MotionLog, Failure> {
-    make_folder(folder)?;
-    let file = folder.join("log.csv");
-    MotionLog::create(&file)
-        .map_err(|e| Failure::Unusable(format!("{}: cannot be written: {e}", file.display())))
-}
-
-/// Ends it.
-pub(crate) fn close(log: MotionLog) -> Result<(), Failure> {
-    log.close().map_err(|e| Failure::Refused(format!("the log cannot be written: {e}")))
-}
-
 /// Makes a folder for results, where it is missing; refused where files of their names in it are none of them.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
     replace::check_folder(folder)?;
@@ -151,12 +128,14 @@ pub(crate) fn json(value: &impl serde::Serialize) -> Result<String, Failure> {
     files::json(value).map_err(Failure::Refused)
 }
 
-/// How much a command prints: what `--verbose` and `--quiet` say.
-#[derive(Clone, Copy, Debug)]
+/// How much a command prints.
+#[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct Verbosity {
-    /// Every note and all evidence.
+    /// Print more: what is done with the arm, on standard error, and every note and all evidence of a result.
+    #[arg(short, long, global = true, conflicts_with = "quiet")]
     pub verbose: bool,
-    /// Nothing but errors.
+    /// Print nothing but errors.
+    #[arg(short, long, global = true)]
     pub quiet: bool,
 }
 
@@ -270,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    #[cfg(unix)]
+    #[cfg(all(unix, feature = "cli"))]
     fn work_takes_processor_time() {
         let (before, began) = (processor(), Instant::now());
         while began.elapsed() < Duration::from_millis(30) {

@@ -1,7 +1,7 @@
 //! `powerball bus enable`, `stop` and `move`.
 
 use super::super::envelope::Surroundings;
-use super::super::output;
+use super::super::{motion, output};
 use super::{Consent, Failure, Where, master, refused};
 use crate::procedure::{RecordError, Recorder};
 use clap::Args;
@@ -229,7 +229,7 @@ impl Move {
         let envelope = self.surroundings.envelope(&self.surroundings.arm()?, &self.mounting)?;
         let mut recorder = Recorder::bring_up(master(&self.place, self.consent)?, envelope)
             .map_err(arm)?
-            .with_progress(output::live());
+            .with_progress(motion::live());
         let from = recorder.master().driver().positions();
         let mut to = from;
         to[index] = self.to.unwrap_or(from[index] + self.by.unwrap_or(0.0));

@@ -3,7 +3,7 @@
 use super::float::PUSH;
 use super::model_on_bus::{ModelOnBus, failed};
 use super::serve::{self, Live, Serve};
-use super::{Failure, output};
+use super::{Failure, motion, output};
 use crate::commands::model_arm::{self, ModelArm};
 use crate::procedure::Envelope;
 use crate::procedure::follow::{Followed, Law, Parts, Path, Run, Sample, Track};
@@ -144,7 +144,7 @@ impl FollowCommand {
         let live = self.serve.open()?;
         let (mut shown, mut seconds) = (0, 0.0);
 
-        let mut log = output::motion_log(&self.out)?;
+        let mut log = motion::motion_log(&self.out)?;
         let mut master = self.on.master(profile, [0.0; 6], None)?;
         let terminal = output::Progress::new();
         let mut tracks: Vec<(&str, Track<6>)> = Vec::new();
@@ -184,7 +184,7 @@ impl FollowCommand {
             }
         }
         drop(master);
-        output::close(log)?;
+        motion::close(log)?;
         let done = self.report(&arm.name, &law, &path, &tracks, pole);
         live.end(&match &done {
             Ok(()) => format!("done: {}", self.out.join("report.html").display()),

@@ -2,7 +2,7 @@
 
 use super::model_on_bus::{ModelOnBus, failed};
 use super::serve::{self, Serve};
-use super::{Failure, output};
+use super::{Failure, motion, output};
 use crate::commands::model_arm::{self, ModelArm};
 use crate::procedure::torque_loop::TorqueLoop;
 use crate::procedure::{Envelope, Recorder};
@@ -127,7 +127,7 @@ impl FloatCommand {
         live.start("an arm guided by hand", &[("position", "rad"), ("velocity", "rad/s"), ("torque", "N·m")]);
         let most = seconds.map(|s| (s / LWA4P.period_seconds()) as usize);
         let mut positions = Vec::new();
-        let mut log = self.out.as_deref().map(output::motion_log).transpose()?;
+        let mut log = self.out.as_deref().map(motion::motion_log).transpose()?;
         arm.run(log.as_mut(), |measured| {
             if most.is_some_and(|most| positions.len() >= most) {
                 return None;
@@ -162,7 +162,7 @@ impl FloatCommand {
             );
         }
         arm.finish().map_err(refused)?;
-        log.map_or(Ok(()), output::close)?;
+        log.map_or(Ok(()), motion::close)?;
         live.end("brakes closed");
         Ok(positions)
     }

@@ -1,9 +1,9 @@
 //! `powerball friction`: the friction experiment on an arm, and the laws that fit.
 
-use super::Failure;
 use super::bus::{Consent, Where, virtual_bus};
 use super::envelope::Surroundings;
 use super::output::{self, Progress};
+use super::{Failure, motion};
 use crate::procedure::friction::{
     Experiment, FrictionError, JointFriction, analyse, is_complete, log_file, plan, run,
 };
@@ -171,7 +171,7 @@ impl Friction {
             let refused = |e: RecordError| Failure::Refused(e.to_string());
             let mut recorder = Recorder::enable(self.place.driver(bus, self.consent)?, envelope)
                 .map_err(refused)?
-                .with_progress(output::live());
+                .with_progress(motion::live());
             let joints = open.iter().map(|experiment| experiment.plan.joint);
             // The first that fails is the last. No log is waited for before the arm stands.
             let mut done = Ok(());

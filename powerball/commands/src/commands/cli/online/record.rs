@@ -3,7 +3,7 @@
 use super::bus::{Consent, Where, master};
 use super::envelope::Surroundings;
 use super::log::joint_names;
-use super::{Failure, output, replace};
+use super::{Failure, motion, output, replace};
 use crate::procedure::{Behind, RecordError, record};
 use clap::Args;
 use powerball_bus::driver::lwa4p::LWA4P;
@@ -68,7 +68,7 @@ impl RecordCommand {
             tracing::warn!("an earlier recording was interrupted: its lines are now in {file}");
         }
         let mut log = Behind::new(log);
-        let done = record(master, &motion, envelope, output::live(), &mut log);
+        let done = record(master, &motion, envelope, motion::live(), &mut log);
         // A recording that failed is closed too: what was recorded counts. The reported error is why it
         // failed.
         let (log, written) = log.close();

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  powerball profile --dcf Schunk_0_63.dcf --arm powerball/lwa4p_bus.toml \
         --constant LWA4P -o lwa4p.rs")]
-pub(super) struct ProfileCommand {
+pub(crate) struct ProfileCommand {
     /// The drive's DCF or EDS.
     #[arg(long, value_name = "FILE")]
     dcf: PathBuf,
