@@ -118,7 +118,7 @@ pub(super) fn parse(
 pub(super) type Finish<T> = for<'s> fn(Samples<'s>, bool) -> Result<T, LogError>;
 
 /// The log of an arm whose torques are measured.
-fn log_of(samples: Samples<'_>, torn: bool) -> Result<Log, LogError> {
+pub(super) fn log_of(samples: Samples<'_>, torn: bool) -> Result<Log, LogError> {
     samples.finish(torn)
 }
 

@@ -58,7 +58,7 @@ fn parse(bytes: &[u8], file: &str, arm: &Arm, findings: &mut Vec<Finding>) -> Re
         let read = |samples: &mut super::read::Samples<'_>, _: &mut Vec<Finding>| {
             crate::tables::columnar::read(input, file, samples).map(|()| false)
         };
-        return super::read::rows(asked, findings, read);
+        return super::read::rows(asked, findings, super::read::log_of, read);
     }
     super::read::parse(bytes, asked, findings)
 }
