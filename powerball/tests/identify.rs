@@ -263,6 +263,8 @@ fn the_library_gives_what_the_command_writes() {
     let held_out: Vec<&str> = other.iter().map(String::as_str).collect();
     let rest = [&["--out", &out, "--json", "--validate"][..], &held_out].concat();
     let mut written = json(&run(&["identify", "--arm", &arm], &fit, &rest));
+    // The library does not know where the arm came from.
+    assert_eq!(written.as_object_mut().unwrap().remove("arm_file"), Some(arm.as_str().into()));
     let arm = dyngen::Arm::read(Path::new(&arm)).unwrap();
     let file = |name: &String| Source::file(name);
     let options = IdentifyOptions::default();

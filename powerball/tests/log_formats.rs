@@ -469,7 +469,7 @@ fn datasets_of_lerobot_are_read_as_they_are() {
     assert!(asked(&folder, &degrees).contains("git lfs pull"), "{}", asked(&folder, &degrees));
     std::fs::copy(data("lerobot_v30/data/chunk-000/file-000.parquet"), &file).unwrap();
     let notes = notes_of(&read_contents(&folder).unwrap());
-    assert!(notes.contains("counts 3 episodes, and 2 are there"), "{notes}");
+    assert!(notes.contains("lists 3 episodes, but 2 are there"), "{notes}");
     // A file of another dataset among them.
     std::fs::copy(data("types.parquet"), folder.join("data/chunk-000/file-001.parquet")).unwrap();
     assert!(asked(&folder, &degrees).contains("other columns"), "{}", asked(&folder, &degrees));

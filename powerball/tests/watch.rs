@@ -128,6 +128,17 @@ fn a_change_is_one_event_and_no_change_is_none() {
                 assert_eq!(a["value"], b["value"]);
             }
         }
+        // The recipe of docs/watch.md for ROS 2, in one word.
+        let expected = match name {
+            "contact_wrench" => "collision\n",
+            "payload" => "load\n",
+            _ => "",
+        };
+        let words: Vec<&str> =
+            base.iter().map(|word| if *word == "--json" { "--word" } else { *word }).collect();
+        let output = run(&[&words[..], &["-"]].concat(), Some(&from_joint_states(&csv)));
+        assert_eq!(String::from_utf8_lossy(&output.stdout), expected, "{name}");
+        assert_eq!(output.status.code(), Some(i32::from(!expected.is_empty())));
         let [event] = found.as_slice() else {
             assert!(name == "clean" && found.is_empty(), "{name}: {found:?}");
             continue;
@@ -142,6 +153,32 @@ fn a_change_is_one_event_and_no_change_is_none() {
             assert!((number(&event["value"]["end_time"]) - AT - 1.0).abs() < 0.3, "{event}");
         }
     }
+}
+
+/// A log as `ros2 topic echo --csv /joint_states` prints it, and back by the script of the recipe.
+fn from_joint_states(csv: &str) -> String {
+    let mut lines = csv.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let message = |line: &str| {
+        let values: Vec<f64> = line.split(',').map(|value| value.parse().unwrap_or(0.0)).collect();
+        let of = |name: &str| values[names.iter().position(|own| *own == name).unwrap()];
+        let nanoseconds = (1e9 * of("t")).round() as u64;
+        let (seconds, rest) = (1_700_000_000 + nanoseconds / 1_000_000_000, nanoseconds % 1_000_000_000);
+        let [q1, q2, tau1, tau2] = ["q1", "q2", "tau1", "tau2"].map(of);
+        format!("{seconds},{rest},base,joint1,joint2,{q1},{q2},0.0,0.0,{tau1},{tau2}\n")
+    };
+    let messages: String = lines.map(message).collect();
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/ros2/joint_states.awk");
+    let mut child = Command::new("awk")
+        .arg("-f")
+        .arg(script)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut pipe = child.stdin.take().unwrap();
+    std::thread::spawn(move || drop(pipe.write_all(messages.as_bytes())));
+    String::from_utf8(child.wait_with_output().unwrap().stdout).unwrap()
 }
 
 /// Lines of a CSV as JSON objects.

@@ -60,6 +60,10 @@ pub(crate) struct WatchCommand {
     /// One JSON object a line for each change; the last line goes to standard error.
     #[arg(long)]
     json: bool,
+    /// One word a line for each change: `load` for a payload, `collision` for a push, else the name of the
+    /// effect; the last line goes to standard error.
+    #[arg(long, conflicts_with = "json")]
+    word: bool,
     /// Exit with 0 even if something changed: for pipes that stop at the first command that fails.
     #[arg(long)]
     exit_zero: bool,
@@ -155,7 +159,7 @@ impl WatchCommand {
             1 => format!("changed: 1 event in {of}"),
             several => format!("changed: {several} events in {of}"),
         };
-        match self.json {
+        match self.json || self.word {
             true => eprintln!("{line}"),
             false => output::print(&line),
         }
@@ -290,11 +294,23 @@ impl WatchCommand {
         watch.notes().iter().for_each(|note| tracing::warn!("{note}"));
         for event in events {
             live.event(&event.sentence());
-            match self.json {
-                true => output::print(&serde_json::to_string(event).unwrap_or_default()),
-                false => output::print(&event.sentence()),
+            match (self.json, self.word) {
+                (true, _) => output::print(&serde_json::to_string(event).unwrap_or_default()),
+                // The end of a push is no new one.
+                (_, true) if event.evidence.ends => {}
+                (_, true) => output::print(word(&event.what)),
+                _ => output::print(&event.sentence()),
             }
         }
+    }
+}
+
+/// A change in one word.
+fn word(what: &str) -> &str {
+    match what {
+        "payload" => "load",
+        "contact_wrench" => "collision",
+        other => other,
     }
 }
 
