@@ -45,6 +45,8 @@ pub struct Problem<'l> {
     bodies: Vec<Body>,
     /// The log of each track.
     pub log: Vec<usize>,
+    /// Whether a payload that is fitted is in each track.
+    loaded: Vec<bool>,
     /// What is known, and what the rest is taken for.
     pub constants: Constants,
     /// Values of the inertial parameters.
@@ -112,8 +114,9 @@ impl<'l> Problem<'l> {
         let constants = given(&known.servo);
         let inertial = known.values.map_or(vec![0.0; arm.names().len()], <[f64]>::to_vec);
         let payload = known.payload.to_vec();
-        let mut problem =
-            Problem { joint, tracks, bodies, log, constants, inertial, payload, roles: Vec::new() };
+        let loaded = vec![true; tracks.len()];
+        let roles = Vec::new();
+        let mut problem = Problem { joint, tracks, bodies, log, loaded, constants, inertial, payload, roles };
         problem.roles = problem.free(known);
         Some(problem)
     }
@@ -123,16 +126,8 @@ impl<'l> Problem<'l> {
     pub fn in_logs<'o>(&self, arm: &RigidArm, logs: &'o [ServoLog], joint: usize) -> Problem<'o> {
         let (tracks, bodies, log) = tracks(arm, logs, joint);
         let (inertial, payload) = (self.inertial.clone(), self.payload.clone());
-        Problem {
-            joint,
-            tracks,
-            bodies,
-            log,
-            constants: self.constants,
-            inertial,
-            payload,
-            roles: Vec::new(),
-        }
+        let (loaded, constants, roles) = (vec![true; tracks.len()], self.constants, Vec::new());
+        Problem { joint, tracks, bodies, log, loaded, constants, inertial, payload, roles }
     }
 
     /// The part of it that is one log.
@@ -143,6 +138,7 @@ impl<'l> Problem<'l> {
             tracks: own.iter().map(|k| self.tracks[*k]).collect(),
             bodies: own.iter().map(|k| self.bodies[*k].clone()).collect(),
             log: vec![log; own.len()],
+            loaded: own.iter().map(|k| self.loaded[*k]).collect(),
             ..self.clone()
         }
     }
@@ -157,7 +153,15 @@ impl<'l> Problem<'l> {
             self.tracks.extend_from_slice(&other.tracks);
             self.bodies.extend_from_slice(&other.bodies);
             self.log.extend_from_slice(&other.log);
+            self.loaded.extend_from_slice(&other.loaded);
         }
+        self
+    }
+
+    /// It, without the payload that may be fitted.
+    #[must_use]
+    pub fn unloaded(mut self) -> Problem<'l> {
+        self.loaded.fill(false);
         self
     }
 
@@ -444,6 +448,7 @@ impl Errors for Problem<'_> {
 
     fn of(&self, stretch: usize, values: &[f64]) -> Vec<f64> {
         let (constants, mut inertial, mass) = self.at(values);
+        let mass = if self.loaded[stretch] { mass } else { 0.0 };
         inertial.iter_mut().zip(&self.payload).for_each(|(own, unit)| *own += mass * unit);
         let track = &self.tracks[stretch];
         let simulated = simulate(track, &self.bodies[stretch].with(&inertial), &constants);
