@@ -215,7 +215,7 @@ pub(super) fn together<'o>(each: &[Problem<'o>], own: &[usize]) -> Problem<'o> {
 }
 
 /// A payload of `own` logs, fitted with all constants of the joint, which the logs `like` share: what friction and what
-/// weight is, is asked of both loads. With the errors of `own`.
+/// weight is, both loads decide. With the errors of `own`.
 pub(super) fn payload(
     each: &[Problem<'_>],
     (like, own): (&[usize], &[usize]),

@@ -90,7 +90,7 @@ fn steps_of_milliseconds_are_as_good_as_steps_of_microseconds() {
     let arm = pendulum(0.12, "kp = 16");
     let servos = ServoArm::new(&arm, Some(&point(0.8))).unwrap();
     for (log, most) in synthetic(&arm).iter().zip([5e-4, 5e-4, 2e-3]) {
-        let body = &body::bodies(&servos.body, log, 0, std::slice::from_ref(&(0..log.t.len())))[0];
+        let body = &body::bodies(&servos.body, log, 0, &log.pieces)[0];
         let on = log.enabled.as_ref().map(|on| on[0].as_slice());
         let track = Track { t: &log.t, q: &log.q[0], goal: &log.goal[0], on };
         let simulated = simulate(&track, &body.with(servos.values.as_deref().unwrap()), &truth());
@@ -142,7 +142,7 @@ fn closed_forms_are_met() {
         ServoLog::from_columns("log", arm.body.arm(), &columns).unwrap().0
     };
     let log = log(&rest, &still);
-    let bodies = body::bodies(&arm.body, &log, 0, &[0..t.len()]);
+    let bodies = body::bodies(&arm.body, &log, 0, &log.pieces);
     let moved = bodies[0].with(arm.values.as_deref().unwrap());
     let off = vec![false; t.len()];
     let swing = Track { t: &t, q: &rest, goal: &still, on: Some(&off) };
@@ -187,7 +187,7 @@ fn the_body_of_a_joint_is_the_arms_inverse_dynamics() {
     }
     let log = ServoLog::from_columns("log", arm.arm(), &columns).unwrap().0;
     for j in 0..3 {
-        let moved = body::bodies(&arm, &log, j, &[0..t.len()])[0].with(&p);
+        let moved = body::bodies(&arm, &log, j, &log.pieces)[0].with(&p);
         for (k, angle) in [(60, 0.3), (100, -2.0), (140, 1.1)] {
             // The others by the waves' own derivatives: those of the log are filtered.
             let at = |f: &dyn Fn(f64, f64) -> f64| [1.0, 1.3, 0.7].map(|w| f(w, t[k]));
