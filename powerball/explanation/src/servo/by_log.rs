@@ -7,7 +7,7 @@
 use crate::rule::Rule;
 use powerball_identification::servo::constants::Constant;
 use powerball_identification::servo::fit::{Fitted, Free, errors, fit, objective, slopes};
-use powerball_identification::servo::{Problem, Role, standard_errors};
+use powerball_identification::servo::{Joint, Problem, Role, standard_errors};
 
 /// Masses that are tried first, in units of the mass whose weight is a tenth of the torque at full duty: a swing in phase
 /// with another mass is a minimum too.
@@ -68,6 +68,11 @@ impl Size {
     pub(super) fn left(&self) -> f64 {
         self.after / self.before.max(f64::MIN_POSITIVE)
     }
+
+    /// Whether it is away from none, next to how much logs without a change differ.
+    fn is_clear(&self, change: Change, spread: f64) -> bool {
+        (self.value - change.none()).abs() > CLEAR * self.std.hypot(spread)
+    }
 }
 
 /// The size of a change in the logs of a problem, everything else as it is there; `None` where the joint cannot show it.
@@ -99,6 +104,17 @@ pub(super) fn size(problem: &Problem<'_>, change: Change) -> Option<Size> {
     Some(Size { value: best.values[0] / scale, std: std / scale, before, after: best.objective })
 }
 
+/// The errors of a problem with a change of a size.
+pub(super) fn changed(problem: &Problem<'_>, change: Change, value: f64) -> Vec<Vec<f64>> {
+    match change {
+        Change::Payload => errors(&problem.asking(vec![Role::Payload]), &[value]),
+        Change::Gain => {
+            let kp = problem.constants.of(Constant::Kp);
+            errors(&problem.asking(vec![Role::Constant(Constant::Kp)]), &[value * kp])
+        }
+    }
+}
+
 /// The sizes of every change in every log, one problem a log.
 pub(super) fn sizes(logs: &[Problem<'_>]) -> Vec<[Option<Size>; 2]> {
     logs.iter().map(|log| Change::ALL.map(|change| size(log, change))).collect()
@@ -128,11 +144,10 @@ pub(super) fn odd(sizes: &[[Option<Size>; 2]], rule: &Rule) -> Vec<Option<Change
     let best = |of: &[Option<Size>; 2]| -> Option<Change> {
         let clear = |change: &Change| {
             of[*change as usize].is_some_and(|size| {
-                let error = size.std.hypot(spreads[*change as usize]);
                 let is_large = size.before > rule.odd_log * usual;
                 is_large
                     && size.left() <= rule.event_left
-                    && (size.value - change.none()).abs() > CLEAR * error
+                    && size.is_clear(*change, spreads[*change as usize])
             })
         };
         let left = |change: &Change| of[*change as usize].map_or(f64::INFINITY, |size| size.after);
@@ -141,10 +156,13 @@ pub(super) fn odd(sizes: &[[Option<Size>; 2]], rule: &Rule) -> Vec<Option<Change
     sizes.iter().map(best).collect()
 }
 
-/// The logs of each change, those whose sizes agree together: two loads are two effects.
+/// The logs of each change, those whose sizes agree together: two loads are two effects. A size has its own standard error, and
+/// in addition what logs without a change differ by.
 pub(super) fn groups(changes: &[Option<Change>], sizes: &[[Option<Size>; 2]]) -> Vec<(Change, Vec<usize>)> {
     let mut groups: Vec<(Change, Vec<usize>)> = Vec::new();
+    let odd: Vec<bool> = changes.iter().map(Option::is_some).collect();
     for change in Change::ALL {
+        let spread = spread(sizes, &odd, change);
         let of = |k: &usize| sizes[*k][change as usize];
         let mut own: Vec<usize> = (0..changes.len()).filter(|k| changes[*k] == Some(change)).collect();
         own.sort_by(|a, b| of(a).map_or(0.0, |s| s.value).total_cmp(&of(b).map_or(0.0, |s| s.value)));
@@ -155,7 +173,8 @@ pub(super) fn groups(changes: &[Option<Change>], sizes: &[[Option<Size>; 2]]) ->
                 let difference = (size.value - last.value).abs();
                 let share =
                     difference / (size.value - change.none()).abs().max((last.value - change.none()).abs());
-                difference > CLEAR * size.std.hypot(last.std) && share > ALIKE
+                let error = size.std.hypot(spread).hypot(last.std.hypot(spread));
+                difference > CLEAR * error && share > ALIKE
             };
             match groups.last_mut() {
                 Some((of, logs)) if *of == change && !last.is_some_and(apart) => logs.push(k),
@@ -165,4 +184,60 @@ pub(super) fn groups(changes: &[Option<Change>], sizes: &[[Option<Size>; 2]]) ->
         }
     }
     groups
+}
+
+/// Logs that are not unlike enough alone join those whose change, as large as it is there, takes away as much of their squared
+/// error as a change must.
+pub(super) fn join(
+    groups: &mut [(Change, Vec<usize>)],
+    changes: &mut [Option<Change>],
+    (each, sizes): (&[Problem<'_>], &[[Option<Size>; 2]]),
+    rule: &Rule,
+) {
+    let odd: Vec<bool> = changes.iter().map(Option::is_some).collect();
+    for (change, own) in groups {
+        let Some(size) = size(&together(each, own), *change) else { continue };
+        let spread = spread(sizes, &odd, *change);
+        for k in 0..each.len() {
+            let Some(alone) = sizes[k][*change as usize].filter(|_| changes[k].is_none()) else { continue };
+            let with = objective(&changed(&each[k], *change, size.value));
+            if with <= rule.event_left * alone.before && alone.is_clear(*change, spread) {
+                changes[k] = Some(*change);
+                own.push(k);
+            }
+        }
+    }
+}
+
+/// Logs as one problem.
+pub(super) fn together<'o>(each: &[Problem<'o>], own: &[usize]) -> Problem<'o> {
+    each[own[0]].clone().and(own[1..].iter().map(|k| &each[*k]))
+}
+
+/// A payload of `own` logs, fitted with all constants of the joint, which the logs `like` share: what friction and what
+/// weight is, both loads decide. With the errors of `own`.
+pub(super) fn payload(
+    each: &[Problem<'_>],
+    (like, own): (&[usize], &[usize]),
+    joint: &Joint<'_>,
+    size: Size,
+) -> Option<(Size, Vec<Vec<f64>>)> {
+    if like.is_empty() {
+        return None;
+    }
+    let mut roles = joint.problem.roles.clone();
+    roles.push(Role::Payload);
+    let unloaded = together(each, like).unloaded();
+    let count = unloaded.tracks().len();
+    let all = unloaded.and([&together(each, own)]).asking(roles);
+    let start: Vec<f64> = joint.fitted.values.iter().copied().chain([size.value]).collect();
+    let scale = size.value.abs().max(f64::MIN_POSITIVE);
+    let free: Vec<Free> =
+        joint.free.iter().copied().chain([Free { scale, least: f64::NEG_INFINITY }]).collect();
+    let fitted = fit(&all, &start, &free, STEPS);
+    let slopes = slopes(&all, &fitted.values, &free);
+    let std = standard_errors(&slopes, &fitted.errors, &free, all.block()).pop()??;
+    let value = *fitted.values.last()?;
+    let left = fitted.errors[count..].to_vec();
+    Some((Size { value, std, after: objective(&left), ..size }, left))
 }

@@ -56,17 +56,15 @@ fn explain_joint(
     j: usize,
     rule: &Rule,
 ) -> Result<(), IdentifyError> {
-    let mut like: Vec<ServoLog> = logs.to_vec();
-    let mut found = Odd::in_logs(arm, &like, (logs, validate), j, rule)?;
-    if found.changes[..logs.len()].iter().any(Option::is_some) {
-        // They had a part in what they were compared with.
-        let own = logs.iter().zip(&found.changes).filter(|(_, odd)| odd.is_none());
-        like = own.map(|(log, _)| log.clone()).collect();
-        if like.is_empty() {
-            like = logs.to_vec();
-        }
-        found = Odd::in_logs(arm, &like, (logs, validate), j, rule)?;
+    let first = Odd::in_logs(arm, logs, (logs, validate), j, rule)?;
+    let own = logs.iter().zip(&first.changes).filter(|(_, odd)| odd.is_none());
+    let mut like: Vec<ServoLog> = own.map(|(log, _)| log.clone()).collect();
+    if like.is_empty() {
+        like = logs.to_vec();
     }
+    // Odd logs had a part in what they were compared with.
+    let found =
+        if like.len() < logs.len() { Odd::in_logs(arm, &like, (logs, validate), j, rule)? } else { first };
     let odd_in = |of: &[ServoLog], from: usize| -> Vec<ServoLog> {
         of.iter()
             .zip(&found.changes[from..])
@@ -202,27 +200,46 @@ fn p_value(before: &[f64], after: &[f64]) -> f64 {
 }
 
 /// What single logs have on a joint.
-struct Odd<'o> {
-    /// The servo with all friction, in each log.
+struct Odd<'o, 'l> {
+    /// The joint with all friction, as it is in the logs that it is compared with.
+    joint: Joint<'l>,
+    /// It in each log.
     each: Vec<Problem<'o>>,
     /// By log, those to fit first.
     changes: Vec<Option<Change>>,
     sizes: Vec<[Option<Size>; 2]>,
+    /// The logs of each change.
+    groups: Vec<(Change, Vec<usize>)>,
 }
 
-impl<'o> Odd<'o> {
+impl<'o, 'l> Odd<'o, 'l> {
     /// Compared with the servo in the logs `like`.
     fn in_logs(
         arm: &ServoArm,
-        like: &[ServoLog],
+        like: &'l [ServoLog],
         (logs, validate): (&'o [ServoLog], &'o [ServoLog]),
         j: usize,
         rule: &Rule,
-    ) -> Result<Odd<'o>, IdentifyError> {
+    ) -> Result<Odd<'o, 'l>, IdentifyError> {
         let joint = Joint::fit(arm, like, j)?;
         let each = each_log(arm, &joint, (logs, validate), j);
         let sizes = by_log::sizes(&each);
-        Ok(Odd { changes: by_log::odd(&sizes, rule), sizes, each })
+        let mut changes = by_log::odd(&sizes, rule);
+        let mut groups = by_log::groups(&changes, &sizes);
+        by_log::join(&mut groups, &mut changes, (&each, &sizes), rule);
+        Ok(Odd { joint, each, changes, sizes, groups })
+    }
+
+    /// How large a change of logs is, and their errors with it, `None` where the joint cannot show it.
+    fn size(&self, change: Change, own: &[usize], to_fit: usize) -> Option<(Size, Vec<Vec<f64>>)> {
+        let together = by_log::together(&self.each, own);
+        let size = by_log::size(&together, change)?;
+        let like: Vec<usize> = (0..to_fit).filter(|k| self.changes[*k].is_none()).collect();
+        let with_all = match change {
+            Change::Payload => by_log::payload(&self.each, (&like, own), &self.joint, size),
+            Change::Gain => None,
+        };
+        Some(with_all.unwrap_or_else(|| (size, by_log::changed(&together, change, size.value))))
     }
 }
 
@@ -245,35 +262,37 @@ fn report_odd(
     arm: &ServoArm,
     joint: &Joint<'_>,
     (logs, validate): (&[ServoLog], &[ServoLog]),
-    odd: &Odd<'_>,
+    odd: &Odd<'_, '_>,
     j: usize,
 ) {
     let number = JointNumber::from_index(j);
     let each = each_log(arm, joint, (logs, validate), j);
     let mut left: Vec<Vec<Vec<f64>>> = each.iter().map(|problem| errors(problem, &[])).collect();
     let is_odd: Vec<bool> = odd.changes.iter().map(Option::is_some).collect();
-    for (change, own) in by_log::groups(&odd.changes, &odd.sizes) {
-        let together = odd.each[own[0]].clone().and(own[1..].iter().map(|k| &odd.each[*k]));
-        let Some(size) = by_log::size(&together, change) else { continue };
+    for (change, own) in &odd.groups {
+        let change = *change;
+        let Some((size, squares)) = odd.size(change, own, logs.len()) else { continue };
         let spread = by_log::spread(&odd.sizes, &is_odd, change) / (own.len() as f64).sqrt();
-        let std = size.std.hypot(spread).hypot(between(&odd.sizes, &own, change));
-        let (before, squares) = (rms_of(&left, &own), change_errors(&odd.each, &own, change, size.value));
-        own.iter().zip(squares).for_each(|(k, with)| left[*k] = with);
-        let freedom = together.blocks().saturating_sub(1).max(1) as f64;
+        let std = size.std.hypot(spread).hypot(between(&odd.sizes, own, change));
+        let before = rms_of(&left, own);
+        let mut with = squares.into_iter();
+        own.iter().for_each(|k| left[*k] = with.by_ref().take(left[*k].len()).collect());
+        let blocks: usize = own.iter().map(|k| odd.each[*k].blocks()).sum();
+        let freedom = blocks.saturating_sub(1).max(1) as f64;
         let p_value = f_tail(((size.value - change.none()) / std).powi(2), 1.0, freedom);
         let effect = ServoEffect {
             effect: change.name(),
             joints: vec![number],
             parameters: parameters(arm, joint, change, (size.value, std), own.len()),
             rms_before: vec![before],
-            rms_after: vec![rms_of(&left, &own)],
+            rms_after: vec![rms_of(&left, own)],
             p_value,
             probability: 1.0 - p_value,
             logs: own.iter().map(|k| result.logs[*k].log.clone()).collect(),
             leftover: size.left(),
-            rivals: rivals(&odd.sizes, &own, change),
+            rivals: rivals(&odd.sizes, own, change),
         };
-        for k in own {
+        for &k in own {
             let length = if k < logs.len() { &logs[k].t } else { &validate[k - logs.len()].t };
             let share = 1.0 - odd.sizes[k][change as usize].map_or(1.0, |size| size.left());
             result.logs[k].differs.push(Differs {
@@ -307,18 +326,6 @@ fn between(sizes: &[[Option<Size>; 2]], own: &[usize], change: Change) -> f64 {
 
 fn rms_of(left: &[Vec<Vec<f64>>], own: &[usize]) -> f64 {
     rms(&own.iter().flat_map(|k| left[*k].iter().cloned()).collect::<Vec<_>>())
-}
-
-/// The errors of logs with a change of a size.
-fn change_errors(each: &[Problem<'_>], own: &[usize], change: Change, value: f64) -> Vec<Vec<Vec<f64>>> {
-    let with = |k: &usize| {
-        let kp = each[*k].constants.of(Constant::Kp);
-        match change {
-            Change::Payload => errors(&each[*k].asking(vec![Role::Payload]), &[value]),
-            Change::Gain => errors(&each[*k].asking(vec![Role::Constant(Constant::Kp)]), &[value * kp]),
-        }
-    };
-    own.iter().map(with).collect()
 }
 
 fn parameters(

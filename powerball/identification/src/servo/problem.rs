@@ -5,9 +5,11 @@ use super::constants::{Constant, Constants};
 use super::fit::{Errors, Fitted, Free, errors, fit, objective};
 use super::simulate::{Track, simulate};
 use dyngen::arm::Servo;
+use faer::linalg::solvers::Solve;
+use faer::{Mat, Side};
 use powerball_logs::log::ServoLog;
 use powerball_logs::regression::RigidArm;
-use powerball_logs::signal::resample::median_step;
+use powerball_logs::signal::resample::{linear_at, median_step};
 use std::ops::Range;
 
 /// A shorter piece says nothing, s and samples.
@@ -17,7 +19,9 @@ const BLOCK: f64 = 1.0;
 /// A joint that moves this far while it is switched off shows its friction without the motor, rad.
 const FALLS: f64 = 0.05;
 /// Starts that are refined, the steps of each, and the steps of the best one.
-const REFINED: usize = 3;
+const REFINED: usize = 4;
+/// Samples over which a speed is taken.
+const APART: usize = 5;
 const FIRST_STEPS: usize = 15;
 const LAST_STEPS: usize = 60;
 
@@ -41,6 +45,8 @@ pub struct Problem<'l> {
     bodies: Vec<Body>,
     /// The log of each track.
     pub log: Vec<usize>,
+    /// Whether a payload that is fitted is in each track.
+    loaded: Vec<bool>,
     /// What is known, and what the rest is taken for.
     pub constants: Constants,
     /// Values of the inertial parameters.
@@ -88,6 +94,15 @@ fn tracks<'l>(arm: &RigidArm, logs: &'l [ServoLog], joint: usize) -> (Vec<Track<
     (tracks, all, of)
 }
 
+fn is_inertial(role: &Role) -> bool {
+    matches!(role, Role::Inertial(_))
+}
+
+/// 1 at `c`, of `count`.
+fn unit(count: usize, c: usize) -> Vec<f64> {
+    (0..count).map(|k| f64::from(k == c)).collect()
+}
+
 impl<'l> Problem<'l> {
     /// A joint in logs to fit; `None` where no piece of them is long enough.
     #[must_use]
@@ -99,8 +114,9 @@ impl<'l> Problem<'l> {
         let constants = given(&known.servo);
         let inertial = known.values.map_or(vec![0.0; arm.names().len()], <[f64]>::to_vec);
         let payload = known.payload.to_vec();
-        let mut problem =
-            Problem { joint, tracks, bodies, log, constants, inertial, payload, roles: Vec::new() };
+        let loaded = vec![true; tracks.len()];
+        let roles = Vec::new();
+        let mut problem = Problem { joint, tracks, bodies, log, loaded, constants, inertial, payload, roles };
         problem.roles = problem.free(known);
         Some(problem)
     }
@@ -110,16 +126,8 @@ impl<'l> Problem<'l> {
     pub fn in_logs<'o>(&self, arm: &RigidArm, logs: &'o [ServoLog], joint: usize) -> Problem<'o> {
         let (tracks, bodies, log) = tracks(arm, logs, joint);
         let (inertial, payload) = (self.inertial.clone(), self.payload.clone());
-        Problem {
-            joint,
-            tracks,
-            bodies,
-            log,
-            constants: self.constants,
-            inertial,
-            payload,
-            roles: Vec::new(),
-        }
+        let (loaded, constants, roles) = (vec![true; tracks.len()], self.constants, Vec::new());
+        Problem { joint, tracks, bodies, log, loaded, constants, inertial, payload, roles }
     }
 
     /// The part of it that is one log.
@@ -130,6 +138,7 @@ impl<'l> Problem<'l> {
             tracks: own.iter().map(|k| self.tracks[*k]).collect(),
             bodies: own.iter().map(|k| self.bodies[*k].clone()).collect(),
             log: vec![log; own.len()],
+            loaded: own.iter().map(|k| self.loaded[*k]).collect(),
             ..self.clone()
         }
     }
@@ -144,7 +153,15 @@ impl<'l> Problem<'l> {
             self.tracks.extend_from_slice(&other.tracks);
             self.bodies.extend_from_slice(&other.bodies);
             self.log.extend_from_slice(&other.log);
+            self.loaded.extend_from_slice(&other.loaded);
         }
+        self
+    }
+
+    /// It, without the payload that may be fitted.
+    #[must_use]
+    pub fn unloaded(mut self) -> Problem<'l> {
+        self.loaded.fill(false);
         self
     }
 
@@ -231,7 +248,8 @@ impl<'l> Problem<'l> {
         (fitted, free)
     }
 
-    /// Where the search begins: scales from how fast the joint moves and the torque of its bodies, on a grid of gain, delay and torque.
+    /// Where the search begins: scales from how fast the joint moves and the torque of its bodies, on a grid of gain, delay and
+    /// torque, or of inertia where nothing says how large torques are.
     fn starts(&self) -> Vec<(Vec<f64>, Vec<Free>)> {
         let fastest = self.fastest();
         let heaviest = self.heaviest(fastest);
@@ -239,22 +257,69 @@ impl<'l> Problem<'l> {
         let is_free = |c| self.roles.contains(&Role::Constant(c));
         let pick = |c, many: &[f64]| if is_free(c) { many.to_vec() } else { vec![self.constants.of(c)] };
         let torques: Vec<f64> = pick(Constant::Torque, &[1.5, 4.0, 10.0].map(|x| x * heaviest));
+        let inertias: &[f64] = if self.roles.iter().any(is_inertial) { &[0.01, 0.03, 0.1] } else { &[0.03] };
         let mut starts = Vec::new();
-        for torque in torques {
-            for gain in pick(Constant::Gain, &[1.0, 3.0, 8.0].map(|x| x / kp)) {
-                for delay in pick(Constant::Delay, &[0.01, 0.03, 0.06]) {
-                    starts.push(self.start(torque, gain, delay, fastest));
+        for delay in pick(Constant::Delay, &[0.01, 0.03, 0.06]) {
+            let held = self.held(delay, fastest);
+            for torque in &torques {
+                for gain in pick(Constant::Gain, &[1.0, 3.0, 8.0].map(|x| x / kp)) {
+                    for inertia in inertias {
+                        starts.push(self.start([*torque, gain, delay, *inertia], fastest, &held));
+                    }
                 }
             }
         }
         starts
     }
 
-    fn start(&self, torque: f64, gain: f64, delay: f64, fastest: f64) -> (Vec<f64>, Vec<Free>) {
+    /// Inertial parameters by how far from its goal the joint is held, in units of torque·gain: what a slow joint shows without
+    /// any simulation. Empty where none is fitted.
+    fn held(&self, delay: f64, fastest: f64) -> Vec<f64> {
+        /// Slower than this share of the fastest.
+        const SLOW: f64 = 0.1;
+        /// Keeps what the joint does not show near zero.
+        const RIDGE: f64 = 1e-6;
+        let count = self.inertial.len();
+        if !self.roles.iter().any(is_inertial) {
+            return Vec::new();
+        }
+        let size = count + 2;
+        let (mut normal, mut right) = (Mat::<f64>::zeros(size, size), Mat::<f64>::zeros(size, 1));
+        for (track, body) in self.tracks.iter().zip(&self.bodies) {
+            let units: Vec<Vec<Moved>> = (0..count).map(|c| body.with(&unit(count, c))).collect();
+            for k in APART..track.q.len().saturating_sub(APART) {
+                let passed = track.t[k + APART] - track.t[k - APART];
+                let v = (track.q[k + APART] - track.q[k - APART]) / passed;
+                if v.abs() > SLOW * fastest || track.on.is_some_and(|on| !on[k]) {
+                    continue;
+                }
+                let rest = units.iter().map(|m| m.get(k).unwrap_or(&m[0]).rest(track.q[k]));
+                let row: Vec<f64> = rest.chain([v, v.signum()]).collect();
+                let error = linear_at(track.t, track.goal, track.t[k] - delay) - track.q[k];
+                for i in 0..size {
+                    right[(i, 0)] += row[i] * self.constants.of(Constant::Kp) * error;
+                    (0..size).for_each(|j| normal[(i, j)] += row[i] * row[j]);
+                }
+            }
+        }
+        let most = (0..size).map(|i| normal[(i, i)]).fold(f64::MIN_POSITIVE, f64::max);
+        (0..size).for_each(|i| normal[(i, i)] += RIDGE * most);
+        let solved = normal.llt(Side::Lower).map(|factor| factor.solve(&right));
+        solved.map_or(vec![0.0; count], |of| (0..count).map(|c| of[(c, 0)]).collect())
+    }
+
+    /// At a torque, a gain, a delay, and an inertia in units of what the motor's drag stops within a second.
+    fn start(
+        &self,
+        [torque, gain, delay, inertia]: [f64; 4],
+        fastest: f64,
+        held: &[f64],
+    ) -> (Vec<f64>, Vec<Free>) {
         // With no load a motor turns a little faster than it is seen to.
         let drag = torque / (1.2 * fastest);
-        let inertia = 0.03 * drag;
-        let inertial = self.first_inertial(inertia, torque);
+        let inertia = inertia * drag;
+        let held: Vec<f64> = held.iter().map(|own| gain * torque * own).collect();
+        let inertial = self.first_inertial(inertia, torque, &held);
         let one = |role: &Role| -> (f64, Free) {
             let (value, scale, least) = match role {
                 Role::Inertial(c) => (inertial[*c].0, inertial[*c].1, f64::NEG_INFINITY),
@@ -278,33 +343,35 @@ impl<'l> Problem<'l> {
         self.roles.iter().map(one).unzip()
     }
 
-    /// A first value and a scale for each inertial parameter: the strongest one against accelerations is the joint's inertia.
-    fn first_inertial(&self, inertia: f64, torque: f64) -> Vec<(f64, f64)> {
-        let unit = |c: usize| -> (f64, f64) {
-            let values: Vec<f64> = (0..self.inertial.len()).map(|k| f64::from(k == c)).collect();
-            let moved = self.bodies.first().map(|body| body.with(&values)).unwrap_or_default();
+    /// A first value and a scale for each inertial parameter: the strongest one against accelerations makes up the joint's
+    /// inertia, the others are as the held joint shows them.
+    fn first_inertial(&self, inertia: f64, torque: f64, held: &[f64]) -> Vec<(f64, f64)> {
+        let count = self.inertial.len();
+        let of_unit = |c: usize| -> (f64, f64) {
+            let moved = self.bodies.first().map(|body| body.with(&unit(count, c))).unwrap_or_default();
             let rest = |m: &Moved| m.harmonics.iter().fold(0.0f64, |a, x| a.max(x.abs()));
             (
                 moved.iter().fold(0.0, |a, m| a + m.inertia / moved.len() as f64),
                 moved.iter().map(rest).fold(0.0, f64::max),
             )
         };
-        let units: Vec<(f64, f64)> = (0..self.inertial.len()).map(unit).collect();
+        let units: Vec<(f64, f64)> = (0..count).map(of_unit).collect();
         let free = |c: &usize| self.roles.contains(&Role::Inertial(*c));
-        let strongest = (0..units.len()).filter(free).max_by(|a, b| units[*a].0.total_cmp(&units[*b].0));
-        (0..units.len())
+        let strongest = (0..count).filter(free).max_by(|a, b| units[*a].0.total_cmp(&units[*b].0));
+        (0..count)
             .map(|c| {
                 let (own, rest) = units[c];
-                let value = if Some(c) == strongest && own > 0.0 { inertia / own } else { 0.0 };
                 let scale = if rest > 0.0 { 0.2 * torque / rest } else { inertia / own.abs().max(1e-12) };
-                (value, if value > 0.0 { value } else { scale })
+                if Some(c) == strongest && own > 0.0 {
+                    return (inertia / own, inertia / own);
+                }
+                (held.get(c).copied().filter(|_| free(&c)).unwrap_or(0.0), scale)
             })
             .collect()
     }
 
     /// About how fast the joint moves at most, rad/s.
     fn fastest(&self) -> f64 {
-        const APART: usize = 5;
         let speed = |track: &Track<'_>| -> Vec<f64> {
             let at = |k: usize| (track.q[k + APART] - track.q[k]).abs() / (track.t[k + APART] - track.t[k]);
             (0..track.q.len().saturating_sub(APART)).map(at).collect()
@@ -359,7 +426,6 @@ impl<'l> Problem<'l> {
     /// switched off has no goal.
     #[must_use]
     pub fn goal_errors(&self, delay: f64) -> Vec<Vec<f64>> {
-        use powerball_logs::signal::resample::linear_at;
         let of = |track: &Track<'_>| -> Vec<f64> {
             let is_on = |k: &usize| track.on.is_none_or(|on| on[*k]);
             let error = |k: usize| linear_at(track.t, track.goal, track.t[k] - delay) - track.q[k];
@@ -382,6 +448,7 @@ impl Errors for Problem<'_> {
 
     fn of(&self, stretch: usize, values: &[f64]) -> Vec<f64> {
         let (constants, mut inertial, mass) = self.at(values);
+        let mass = if self.loaded[stretch] { mass } else { 0.0 };
         inertial.iter_mut().zip(&self.payload).for_each(|(own, unit)| *own += mass * unit);
         let track = &self.tracks[stretch];
         let simulated = simulate(track, &self.bodies[stretch].with(&inertial), &constants);

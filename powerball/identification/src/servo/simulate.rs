@@ -2,15 +2,18 @@
 //!
 //! (I + J)·q̈ = motor − back_emf·q̇ − rest(q) − friction, with motor = torque·u while the drive is switched on. Friction is
 //! coulomb + load·½·|motor + rest| (what the gear carries between the two) + stribeck·exp(−|q̇|/stribeck_velocity), against the
-//! motion, and viscous·q̇. A step is linearly implicit in what is proportional to q̇; dry friction takes away what it can of the
-//! new velocity and no more, so that a joint sticks without chatter (as velocity-level contact solvers do; Duclusaud et al.,
-//! *Extended Friction Models for the Physics Simulation of Servo Actuators*, 2024, for the friction itself).
+//! motion, and viscous·q̇ (Duclusaud et al., *Extended Friction Models for the Physics Simulation of Servo Actuators*, 2024).
+//!
+//! Velocities are those between the steps of positions (leapfrog, second order). What is proportional to q̇ is solved exactly.
+//! Dry friction brakes a joint until it stops, and beyond that holds it where it can: a joint sticks without chatter.
 
 use super::body::Moved;
 use super::constants::{Constant, Constants};
 
 /// The longest step, s.
 pub const STEP: f64 = 2.5e-3;
+/// A step may be longer by this share.
+const ROUNDING: f64 = 1e-6;
 /// Samples over which the first velocity is taken.
 const FIRST: usize = 4;
 
@@ -30,18 +33,40 @@ pub struct Track<'l> {
 /// The positions of the simulated joint at the times of a track, rad. What it moves is one entry, or one a sample.
 #[must_use]
 pub fn simulate(track: &Track<'_>, moved: &[Moved], constants: &Constants) -> Vec<f64> {
-    let mut joint = Joint::at_start(track, constants);
+    let goal = limited(track, constants.of(Constant::SpeedLimit));
+    let track = &Track { goal: &goal, ..*track };
+    let mut joint = Joint::at_start(track);
     let mut out = Vec::with_capacity(track.t.len());
     out.push(joint.q);
     for k in 1..track.t.len() {
         let (from, to) = (track.t[k - 1], track.t[k]);
-        let steps = ((to - from) / STEP).ceil().max(1.0);
+        let steps = ((to - from) / STEP - ROUNDING).ceil().max(1.0);
         let h = (to - from) / steps;
         let moved = moved.get(k - 1).unwrap_or(&moved[0]);
         for s in 0..steps as usize {
-            joint.step(track, moved, constants, from + h * (s as f64 + 0.5), h);
+            joint.step(track, moved, constants, from + h * s as f64, h);
         }
         out.push(joint.q);
+    }
+    out
+}
+
+/// The set-points as a drive has them that lets its goal move no faster than a limit, rad/s.
+fn limited(track: &Track<'_>, limit: f64) -> Vec<f64> {
+    let mut own = track.goal[0];
+    let mut out = vec![own];
+    for k in 1..track.t.len() {
+        let (from, passed) = (track.goal[k - 1], track.t[k] - track.t[k - 1]);
+        let slope = (track.goal[k] - from) / passed;
+        let way = (from - own).signum();
+        // It reaches the set-point within the interval, or at its end is still behind it.
+        let reached = if from == own { 0.0 } else { (from - own).abs() / (limit - way * slope) };
+        own = if (0.0..passed).contains(&reached) {
+            own + way * limit.min(f64::MAX) * reached + slope.clamp(-limit, limit) * (passed - reached)
+        } else {
+            own + way * limit * passed
+        };
+        out.push(own);
     }
     out
 }
@@ -68,47 +93,52 @@ fn goal_at(track: &Track<'_>, cursor: &mut usize, time: f64) -> f64 {
 struct Joint {
     q: f64,
     v: f64,
-    /// The goal as the drive has it.
-    goal: f64,
     integral: f64,
     cursor: usize,
 }
 
 impl Joint {
-    fn at_start(track: &Track<'_>, constants: &Constants) -> Joint {
+    fn at_start(track: &Track<'_>) -> Joint {
         let last = FIRST.min(track.t.len() - 1);
         let passed = track.t[last] - track.t[0];
         let v = if passed > 0.0 { (track.q[last] - track.q[0]) / passed } else { 0.0 };
-        let mut cursor = 0;
-        let goal = goal_at(track, &mut cursor, track.t[0] - constants.of(Constant::Delay));
-        Joint { q: track.q[0], v, goal, integral: 0.0, cursor }
+        Joint { q: track.q[0], v, integral: 0.0, cursor: 0 }
     }
 
     fn step(&mut self, track: &Track<'_>, moved: &Moved, c: &Constants, time: f64, h: f64) {
         let of = |constant| c.of(constant);
         let seen = time - of(Constant::Delay);
-        let wanted = goal_at(track, &mut self.cursor, seen);
-        let farthest = of(Constant::SpeedLimit) * h;
-        self.goal += (wanted - self.goal).clamp(-farthest, farthest);
+        let goal = goal_at(track, &mut self.cursor, seen);
         let is_on = track.on.is_none_or(|on| on[self.cursor]);
         let rest = moved.rest(self.q + of(Constant::Zero));
         let inertia = moved.inertia + of(Constant::Armature);
         let (motor, back_emf) = match is_on {
-            true => (of(Constant::Torque) * self.duty(c, h), of(Constant::BackEmf)),
+            true => (of(Constant::Torque) * self.duty(c, goal, h), of(Constant::BackEmf)),
             false => (0.0, 0.0),
         };
-        let braked = inertia + h * (back_emf + of(Constant::Viscous));
-        let free = (inertia * self.v + h * (motor - rest)) / braked;
+        // What is proportional to the velocity is solved exactly for a force that is constant over the step.
+        let brake = back_emf + of(Constant::Viscous);
+        let rate = h * brake / inertia;
+        let (kept, push) =
+            if rate > 1e-9 { ((-rate).exp(), -(-rate).exp_m1() / brake) } else { (1.0, h / inertia) };
+        let force = motor - rest;
         let dry = of(Constant::Coulomb)
             + of(Constant::Load) * 0.5 * (motor - back_emf * self.v + rest).abs()
             + of(Constant::Stribeck) * (-(self.v / of(Constant::StribeckVelocity)).abs()).exp();
-        self.v = free.signum() * (free.abs() - h * dry / braked).max(0.0);
+        let way = if self.v == 0.0 { force.signum() } else { self.v.signum() };
+        let next = kept * self.v + push * (force - way * dry);
+        self.v = if next * way >= 0.0 {
+            next
+        } else {
+            // It stops within the step, and in what is left of it goes where the force exceeds friction.
+            next / (next - self.v) * push * force.signum() * (force.abs() - dry).max(0.0)
+        };
         self.q += h * self.v;
     }
 
-    fn duty(&mut self, c: &Constants, h: f64) -> f64 {
+    fn duty(&mut self, c: &Constants, goal: f64, h: f64) -> f64 {
         let of = |constant| c.of(constant);
-        let error = self.goal - self.q;
+        let error = goal - self.q;
         let error = error.signum() * (error.abs() - of(Constant::DeadZone)).max(0.0);
         let own = of(Constant::Kp) * error - of(Constant::Kd) * self.v;
         let limit = of(Constant::PwmLimit);

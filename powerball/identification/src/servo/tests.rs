@@ -84,23 +84,51 @@ fn synthetic(arm: &Arm) -> Vec<ServoLog> {
     vec![of("steps", &steps, 1e9), of("chirp", &chirp, 1e9), of("fall", &fall, 2.5)]
 }
 
+/// The simulation with the true constants.
 #[test]
-#[ignore = "open: the torque comes out 14 % too large, four standard errors off"]
+fn steps_of_milliseconds_are_as_good_as_steps_of_microseconds() {
+    let arm = pendulum(0.12, "kp = 16");
+    let servos = ServoArm::new(&arm, Some(&point(0.8))).unwrap();
+    for (log, most) in synthetic(&arm).iter().zip([5e-4, 5e-4, 2e-3]) {
+        let body = &body::bodies(&servos.body, log, 0, &log.pieces)[0];
+        let on = log.enabled.as_ref().map(|on| on[0].as_slice());
+        let track = Track { t: &log.t, q: &log.q[0], goal: &log.goal[0], on };
+        let simulated = simulate(&track, &body.with(servos.values.as_deref().unwrap()), &truth());
+        let error = rms(&[simulated.iter().zip(&log.q[0]).map(|(s, q)| s - q).collect()]);
+        assert!(error < most, "{}: {error} rad", log.file);
+    }
+}
+
+#[test]
 fn a_servo_of_another_formulation_is_recovered() {
     let arm = pendulum(0.12, "kp = 16");
     let logs = synthetic(&arm);
     let servos = ServoArm::new(&arm, Some(&point(0.8))).unwrap();
     let found = identify_servos(&servos, &logs, &[], Progress::default()).unwrap();
     assert!(found.unusable.is_empty(), "{:?}", found.unusable);
-    assert!(found.fit.position_error[0] < 5e-3, "{:?}", found.fit);
+    assert!(found.fit.position_error[0] < 2e-3, "{:?}", found.fit);
     for p in found.servo[0].parameters.iter().filter(|p| !p.known) {
         let (constant, ..) = ALL.into_iter().find(|(_, name, _)| *name == p.name).unwrap();
         let (true_value, std) = (truth().of(constant), p.std.unwrap());
         let off = (p.value - true_value).abs();
         // Steps of 2.5 ms against 20 µs: a percent, whatever the interval.
-        let own = if constant == Constant::Zero { 0.005 } else { 0.06 * true_value };
+        let own = if constant == Constant::Zero { 0.002 } else { 0.02 * true_value };
         assert!(off < (4.0 * std).max(own), "{}: {} ± {std}, {true_value}", p.name, p.value);
     }
+}
+
+#[test]
+fn without_masses_torques_are_shares_of_the_torque_at_full_duty() {
+    let arm = pendulum(0.12, "kp = 16");
+    let logs = synthetic(&arm);
+    let servos = ServoArm::new(&arm, None).unwrap();
+    let found = identify_servos(&servos, &logs, &[], Progress::default()).unwrap();
+    assert!(!found.servo[0].absolute && found.fit.position_error[0] < 2e-3, "{:?}", found.fit);
+    let of = |name: &str| found.servo[0].parameters.iter().find(|p| p.name == name).unwrap().value;
+    // 0.12 N·m of 6 N·m.
+    assert!((of("coulomb") / 0.02 - 1.0).abs() < 0.03, "{}", of("coulomb"));
+    assert!((of("back_emf") / (1.1 / 6.0) - 1.0).abs() < 0.03, "{}", of("back_emf"));
+    assert_eq!(found.parameters.len(), 3, "{:?}", found.parameters);
 }
 
 /// Switched off and without friction it is a pendulum; at full duty it runs at torque/back_emf; friction holds it.
@@ -114,7 +142,7 @@ fn closed_forms_are_met() {
         ServoLog::from_columns("log", arm.body.arm(), &columns).unwrap().0
     };
     let log = log(&rest, &still);
-    let bodies = body::bodies(&arm.body, &log, 0, &[0..t.len()]);
+    let bodies = body::bodies(&arm.body, &log, 0, &log.pieces);
     let moved = bodies[0].with(arm.values.as_deref().unwrap());
     let off = vec![false; t.len()];
     let swing = Track { t: &t, q: &rest, goal: &still, on: Some(&off) };
@@ -159,7 +187,7 @@ fn the_body_of_a_joint_is_the_arms_inverse_dynamics() {
     }
     let log = ServoLog::from_columns("log", arm.arm(), &columns).unwrap().0;
     for j in 0..3 {
-        let moved = body::bodies(&arm, &log, j, &[0..t.len()])[0].with(&p);
+        let moved = body::bodies(&arm, &log, j, &log.pieces)[0].with(&p);
         for (k, angle) in [(60, 0.3), (100, -2.0), (140, 1.1)] {
             // The others by the waves' own derivatives: those of the log are filtered.
             let at = |f: &dyn Fn(f64, f64) -> f64| [1.0, 1.3, 0.7].map(|w| f(w, t[k]));
@@ -183,8 +211,8 @@ fn what_cannot_be_simulated_is_refused() {
     assert!(why.contains("joint 1 is prismatic"), "{why}");
 }
 
-/// Extended friction model M6 of Duclusaud et al. with the values that the owners of the logs found for this servo.
-fn m6(log: &ServoLog, (mass, length, kp): (f64, f64, f64)) -> Vec<f64> {
+/// Extended friction model M6 of Duclusaud et al. with the values that the owners of the logs found for this servo, and a delay.
+fn m6(log: &ServoLog, (mass, length, kp): (f64, f64, f64), delay: f64) -> Vec<f64> {
     let (k, r, armature, offset, stribeck) = (3.5555, 7.1214, 0.0283, -0.0140, 0.0840);
     let (of_motor, of_body, speed, alpha, viscous) = (0.2892, 0.2985, 0.0748, 1.2952, 0.0762);
     let (mut q, mut v, mut out) = (log.q[0][0], 0.0f64, vec![log.q[0][0]]);
@@ -192,8 +220,9 @@ fn m6(log: &ServoLog, (mass, length, kp): (f64, f64, f64)) -> Vec<f64> {
     for n in 1..log.t.len() {
         let h = (log.t[n] - log.t[n - 1]) / 4.0;
         let is_on = log.enabled.as_ref().is_none_or(|on| on[0][n - 1]);
+        let goal = linear_at(&log.t, &log.goal[0], log.t[n - 1] - delay);
         for _ in 0..4 {
-            let duty = (kp * 0.1649 * (log.goal[0][n - 1] - q)).clamp(-0.97, 0.97);
+            let duty = (kp * 0.1649 * (goal - q)).clamp(-0.97, 0.97);
             let motor = if is_on { k / r * (15.0 * duty - k * v) } else { 0.0 };
             let body = -mass * 9.81 * length * (q + offset).sin();
             let fade = (-(v / speed).abs().powf(alpha)).exp();
@@ -207,38 +236,47 @@ fn m6(log: &ServoLog, (mass, length, kp): (f64, f64, f64)) -> Vec<f64> {
     out.iter().zip(&log.q[0]).map(|(s, q)| s - q).collect()
 }
 
-/// Held-out error of the fit and of M6, rad, of one load and gain.
-fn held_out(measured: &Measured, (name, mass): (&str, f64), length: f64, kp: u32) -> [f64; 2] {
+/// Held-out error of the fit, of M6 as its owners simulate it, and of M6 with the delay that is best for it, rad, of one load and gain.
+fn held_out(measured: &Measured, (name, mass): (&str, f64), length: f64, kp: u32) -> [f64; 3] {
     let arm = pendulum(length, &format!("kp = {kp}"));
     let [logs, validate] = [1, 2].map(|repetition| measured.logs((name, length, kp), repetition));
     let servos = ServoArm::new(&arm, Some(&point(mass))).unwrap();
     let found = identify_servos(&servos, &logs, &validate, Progress::default()).unwrap();
-    let of_m6 = |log: &ServoLog| m6(log, (mass, length, f64::from(kp)));
-    [found.validate.unwrap().position_error[0], rms(&validate.iter().map(of_m6).collect::<Vec<_>>())]
+    let of_m6 = |delay: f64| {
+        rms(&validate.iter().map(|log| m6(log, (mass, length, f64::from(kp)), delay)).collect::<Vec<_>>())
+    };
+    let delayed = (0..16).map(|k| of_m6(5e-3 * f64::from(k))).fold(f64::INFINITY, f64::min);
+    [found.validate.unwrap().position_error[0], of_m6(0.0), delayed]
 }
 
 #[test]
 fn a_measured_servo_is_predicted_better_than_by_its_owners_model() {
     let Some(measured) = Measured::unpack() else { return };
-    let [own, m6] = held_out(&measured, MASSES[0], 0.15, 16);
-    println!("held out {own:.4} rad, M6 {m6:.4} rad");
-    assert!(own < 0.5 * m6, "{own} {m6}");
+    let [own, m6, delayed] = held_out(&measured, MASSES[0], 0.15, 16);
+    println!("held out {own:.4} rad, M6 {m6:.4} rad, with a delay {delayed:.4} rad");
+    assert!(own < 0.5 * delayed, "{own} {m6} {delayed}");
 }
 
 #[test]
 #[ignore = "at_length: twelve fits"]
 fn every_load_and_gain_is_predicted_better_than_by_its_owners_model() {
     let Some(measured) = Measured::unpack() else { return };
-    let (mut sums, mut count) = ([0.0, 0.0], 0.0);
+    let (mut sums, mut count) = ([0.0; 3], 0.0);
     for mass in MASSES {
         for length in LENGTHS {
             for kp in GAINS {
-                let [own, m6] = held_out(&measured, mass, length, kp);
-                println!("{} kg at {length} m, kp {kp}: held out {own:.4} rad, M6 {m6:.4} rad", mass.0);
-                (sums[0], sums[1], count) = (sums[0] + own, sums[1] + m6, count + 1.0);
+                let errors = held_out(&measured, mass, length, kp);
+                let [own, m6, delayed] = errors;
+                println!(
+                    "{} kg at {length} m, kp {kp}: held out {own:.4} rad, M6 {m6:.4} rad, with a delay {delayed:.4} rad",
+                    mass.0
+                );
+                sums.iter_mut().zip(errors).for_each(|(sum, error)| *sum += error);
+                count += 1.0;
             }
         }
     }
-    println!("mean: held out {:.4} rad, M6 {:.4} rad", sums[0] / count, sums[1] / count);
-    assert!(sums[0] < 0.5 * sums[1]);
+    let [own, m6, delayed] = sums.map(|sum| sum / count);
+    println!("mean: held out {own:.4} rad, M6 {m6:.4} rad, with a delay {delayed:.4} rad");
+    assert!(own < 0.5 * delayed, "{own} {delayed}");
 }
