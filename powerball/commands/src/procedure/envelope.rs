@@ -200,7 +200,7 @@ mod tests {
         // 1.1 rad/s at 60 N·m·s/rad, and the arm's weight: more than joint 2 has, in its limits of velocity.
         let rise = way(&LWA4P, &[0.0, 1.7, 0.0, 0.0, 0.0, 0.0], &[0.0; 6], 0.9, 1.0);
         assert!(open.check(&LWA4P, &rise).is_ok());
-        assert!(refused(&envelope(None, 60.0), &rise).contains("joint 2 takes"));
+        assert!(refused(&envelope(None, 60.0), &rise).contains("joint 2 needs"));
         let folded = to([0.0, 0.0, 2.7, 0.0, 0.0, 0.0]);
         assert!(refused(&open, &folded).contains("link"), "{}", refused(&open, &folded));
         let far = way(&LWA4P, &[0.0; 6], &[0.0, 2.0, 0.0, 0.0, 0.0, 0.0], 0.9, 1.0);
@@ -214,6 +214,6 @@ mod tests {
         let mut motion = way(&LWA4P, &[0.0, 1.7, 0.0, 0.0, 0.0, 0.0], &[0.0; 6], 0.9, 1.0);
         motion.dq.iter_mut().chain(&mut motion.ddq).for_each(|x| *x = 0.0);
         let text = envelope(None, 60.0).check(&LWA4P, &motion).unwrap_err().to_string();
-        assert!(text.contains("joint 2 takes"), "{text}");
+        assert!(text.contains("joint 2 needs"), "{text}");
     }
 }

@@ -114,6 +114,9 @@ pub(super) fn parse(
     rows(asked, findings, log_of, |samples, notes| text::read(input, asked.file, samples, notes))
 }
 
+/// A signal that a log may lack, by joint and sample.
+pub(super) type Optional = Option<Vec<Vec<f64>>>;
+
 /// What is made of samples; whether the last one is torn.
 pub(super) type Finish<T> = for<'s> fn(Samples<'s>, bool) -> Result<T, LogError>;
 
@@ -200,7 +203,7 @@ pub(super) struct Raw {
     pub(super) temperature: Option<Vec<Vec<f64>>>,
     pub(super) dq: Vec<Vec<f64>>,
     pub(super) motor: Option<Vec<Vec<f64>>>,
-    pub(super) of_servos: Vec<Option<Vec<Vec<f64>>>>,
+    pub(super) of_servos: Vec<Optional>,
 }
 
 impl Raw {
@@ -301,10 +304,7 @@ impl<'a> Samples<'a> {
     }
 
     /// The log of what was taken, what its torques were made of, and what only logs of servos have.
-    pub(super) fn finished(
-        mut self,
-        torn: bool,
-    ) -> Result<(Log, Effort, Vec<Option<Vec<Vec<f64>>>>), LogError> {
+    pub(super) fn finished(mut self, torn: bool) -> Result<(Log, Effort, Vec<Optional>), LogError> {
         let file = self.asked.file;
         if torn && self.total > 0 {
             let message =
