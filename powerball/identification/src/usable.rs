@@ -76,7 +76,7 @@ pub(crate) fn doubts<'l>(arm: &Arm, logs: impl IntoIterator<Item = &'l Log>) -> 
     each_once(arm, logs.into_iter().flat_map(|log| &log.doubts))
 }
 
-/// As [`doubts`], of logs of position servos.
+/// The reasons that logs of position servos and their arm give themselves against being used, each once.
 pub fn servo_doubts<'l>(arm: &Arm, logs: impl IntoIterator<Item = &'l ServoLog>) -> Vec<String> {
     each_once(arm, logs.into_iter().flat_map(|log| &log.doubts))
 }
