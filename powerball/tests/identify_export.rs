@@ -232,13 +232,17 @@ fn an_arm_is_exported_for_each_simulator() {
         // In USD the base has a mass too.
         assert!(text.matches(masses).count() >= 2 && text.contains(friction), "{text}");
     }
-    // The result of a command names its arm file.
-    refused("--for sdf identified.json -o arm.sdf", 2, "--arm ARM.toml");
+    // The result of a command names its arm file; else it is arm.toml next to the result.
     let mut named = result.clone();
     named["arm_file"] = "arm.toml".into();
-    put("named.json", &named);
-    notes("--for sdf named.json -o named.sdf");
-    assert_eq!(read("named.sdf"), read("arm.sdf"));
+    fs::create_dir_all(folder.join("apart")).unwrap();
+    for (name, json) in [("identified.json", &result), ("apart/named.json", &named)] {
+        put(name, json);
+        notes(&format!("--for sdf {name} -o named.sdf"));
+        assert_eq!(read("named.sdf"), read("arm.sdf"));
+    }
+    put("apart/nameless.json", &result);
+    refused("--for sdf apart/nameless.json -o nameless.sdf", 2, "--arm ARM.toml");
     fs::write(folder.join("mine.sdf"), "<sdf/>\n").unwrap();
     refused("--for sdf --arm arm.toml identified.json -o mine.sdf", 2, "--force");
     put("comparison.json", &serde_json::json!({"differ": true, "causes": []}));

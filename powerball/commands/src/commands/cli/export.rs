@@ -22,7 +22,7 @@ pub(crate) struct Export {
     #[arg(value_name = "RESULT.json")]
     result: PathBuf,
     /// The arm file (TOML) that the result was identified with, for sdf, usd and fmu. Default: the path in
-    /// identified.json or explained.json.
+    /// identified.json or explained.json, else arm.toml next to the result.
     #[arg(long, value_name = "ARM.toml")]
     arm: Option<PathBuf>,
     /// The file to write.

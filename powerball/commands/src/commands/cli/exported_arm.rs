@@ -38,14 +38,16 @@ pub(super) struct ArmResult {
 impl ArmResult {
     /// Reads a result and the arm file.
     pub(super) fn read(result: &Path, arm: Option<&Path>) -> Result<ArmResult, Failure> {
+        // Of a demo it is next to the result.
+        let next_to_it = result.with_file_name("arm.toml");
         let (file, text, result, recorded) = model_of(result)?;
-        let recorded = recorded.as_deref().filter(|path| path.is_file());
+        let recorded = recorded.into_iter().chain([next_to_it]).find(|path| path.is_file());
         let needed = || {
             let what =
                 "names no arm file that is there: give the one that it was identified with (--arm ARM.toml)";
             Failure::Unusable(format!("{}: {what}", file.display()))
         };
-        let path = arm.or(recorded).ok_or_else(needed)?;
+        let path = arm.or(recorded.as_deref()).ok_or_else(needed)?;
         let filed = Arm::read(path).map_err(|e| Failure::Unusable(e.to_string()))?;
         let read = ModelFile::parse(&text, &file).map_err(|e| Failure::Unusable(e.to_string()))?;
         if !read.model.arm.is_empty() && read.model.arm != filed.name {
