@@ -192,7 +192,7 @@ fn identified(arm: &Arm, values: &[(dyngen::arm::Parameter, f64)], scale: f64) -
         "friction": friction.collect::<Vec<_>>(), "consistent": {"parameters": bodies}})
 }
 
-/// Each form has the arm's bodies and friction, and lists what it lacks; what is missing or not meant is said.
+/// Each form has the arm's bodies and friction, and lists what it lacks; errors name what is missing or not supported.
 #[test]
 fn an_arm_is_exported_for_each_simulator() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("export_arm");

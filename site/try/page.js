@@ -77,7 +77,7 @@ function ran(program, words, show) {
     });
 }
 
-/** A program that broke off, or that could not be had: said in red, and a new worker is begun. */
+/** A program that stopped or could not be loaded: shown in red, and a new worker is started. */
 function failed(why) {
     by("answer").hidden = false;
     by("progress").hidden = true;

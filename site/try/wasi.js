@@ -231,7 +231,7 @@ class Machine {
         view.setBigUint64(out, 0n, true);
         view.setUint8(out, open ? this.kind(open.node) : stream);
         view.setUint16(out + 2, open ? open.flags : 0, true);
-        // Streams can be read and written, and have no place in them; that is how a terminal is told from a file.
+        // Streams can be read and written, and have no place in them; so a terminal differs from a file.
         const rights = open ? 0x1fffffffn : 0x42n;
         view.setBigUint64(out + 8, rights, true);
         view.setBigUint64(out + 16, rights, true);

@@ -133,19 +133,25 @@ pub(super) fn spread(sizes: &[[Option<Size>; 2]], odd: &[bool], change: Change) 
     values.get(values.len() / 2).map_or(0.0, |median| median / 0.6745)
 }
 
-/// Which logs are unlike the others: by log, the change that explains it best.
-pub(super) fn odd(sizes: &[[Option<Size>; 2]], rule: &Rule) -> Vec<Option<Change>> {
-    let none = vec![false; sizes.len()];
-    let mut errors: Vec<f64> =
-        sizes.iter().flat_map(|of| of.iter().flatten().next()).map(|size| size.before).collect();
-    errors.sort_by(f64::total_cmp);
-    let usual = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
-    let spreads = Change::ALL.map(|change| spread(sizes, &none, change));
-    let best = |of: &[Option<Size>; 2]| -> Option<Change> {
+/// The squared error of each log over the median one of the fitted logs, which are the first `fitted`; `None` where no
+/// change can be tested.
+pub(super) fn error_ratios(sizes: &[[Option<Size>; 2]], fitted: usize) -> Vec<Option<f64>> {
+    let error = |of: &[Option<Size>; 2]| of.iter().flatten().next().map(|size| size.before);
+    let mut usual: Vec<f64> = sizes[..fitted].iter().filter_map(error).collect();
+    usual.sort_by(f64::total_cmp);
+    let usual = usual.get(usual.len() / 2).copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
+    sizes.iter().map(|of| Some(error(of)? / usual)).collect()
+}
+
+/// Which logs are unlike the fitted ones, which are the first `fitted`: by log, the change that explains it best. All
+/// validation logs can have a change.
+pub(super) fn odd(sizes: &[[Option<Size>; 2]], fitted: usize, rule: &Rule) -> Vec<Option<Change>> {
+    let ratios = error_ratios(sizes, fitted);
+    let spreads = Change::ALL.map(|change| spread(&sizes[..fitted], &vec![false; fitted], change));
+    let best = |(of, ratio): (&[Option<Size>; 2], &Option<f64>)| -> Option<Change> {
         let clear = |change: &Change| {
             of[*change as usize].is_some_and(|size| {
-                let is_large = size.before > rule.odd_log * usual;
-                is_large
+                ratio.is_some_and(|ratio| ratio > rule.odd_log)
                     && size.left() <= rule.event_left
                     && size.is_clear(*change, spreads[*change as usize])
             })
@@ -153,7 +159,7 @@ pub(super) fn odd(sizes: &[[Option<Size>; 2]], rule: &Rule) -> Vec<Option<Change
         let left = |change: &Change| of[*change as usize].map_or(f64::INFINITY, |size| size.after);
         Change::ALL.into_iter().filter(clear).min_by(|a, b| left(a).total_cmp(&left(b)))
     };
-    sizes.iter().map(best).collect()
+    sizes.iter().zip(&ratios).map(best).collect()
 }
 
 /// The logs of each change, those whose sizes agree together: two loads are two effects. A size has its own standard error, and

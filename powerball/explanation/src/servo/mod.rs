@@ -80,6 +80,10 @@ fn explain_joint(
         Problem::new(&arm.body, &like, j, &known).ok_or_else(|| IdentifyError::NothingUsable(Vec::new()))?;
     problem.roles.retain(|role| *role != Role::Constant(Constant::Load));
     let mut joint = Joint::solve(problem);
+    for (log, ratio) in result.logs.iter_mut().zip(by_log::error_ratios(&found.sizes, logs.len())) {
+        // The largest of all joints.
+        log.error_ratio = ratio.map(f64::sqrt).into_iter().chain(log.error_ratio).reduce(f64::max);
+    }
     let base = joint.problem.in_logs(&arm.body, logs, j);
     let base_validate = joint.problem.in_logs(&arm.body, validate, j);
     result.before.add(&errors(&base, &[]), &errors(&base_validate, &[]));
@@ -224,7 +228,7 @@ impl<'o, 'l> Odd<'o, 'l> {
         let joint = Joint::fit(arm, like, j)?;
         let each = each_log(arm, &joint, (logs, validate), j);
         let sizes = by_log::sizes(&each);
-        let mut changes = by_log::odd(&sizes, rule);
+        let mut changes = by_log::odd(&sizes, logs.len(), rule);
         let mut groups = by_log::groups(&changes, &sizes);
         by_log::join(&mut groups, &mut changes, (&each, &sizes), rule);
         Ok(Odd { joint, each, changes, sizes, groups })

@@ -96,6 +96,9 @@ pub struct LogResult {
     pub log: String,
     /// Whether it is as the others are.
     pub like_the_others: bool,
+    /// Its position error before anything was named, over the median one of the fitted logs; of the joint where it is
+    /// largest.
+    pub error_ratio: Option<f64>,
     /// What it has alone.
     pub differs: Vec<Differs>,
 }
@@ -131,8 +134,12 @@ pub struct ServoVerdict {
 impl ExplainedServos {
     /// Nothing yet.
     pub(super) fn of(arm: &ServoArm, logs: &[ServoLog], validate: &[ServoLog]) -> ExplainedServos {
-        let log =
-            |log: &ServoLog| LogResult { log: log.file.clone(), like_the_others: true, differs: Vec::new() };
+        let log = |log: &ServoLog| LogResult {
+            log: log.file.clone(),
+            like_the_others: true,
+            error_ratio: None,
+            differs: Vec::new(),
+        };
         ExplainedServos {
             unusable: usable::servo_doubts(arm.body.arm(), logs.iter().chain(validate)),
             arm: arm.body.arm().name.clone(),
@@ -149,7 +156,8 @@ impl ExplainedServos {
     /// What follows from all joints.
     pub(super) fn conclude(&mut self, rule: &Rule) {
         for log in &mut self.logs {
-            log.like_the_others = log.differs.is_empty();
+            let is_usual = log.error_ratio.is_none_or(|ratio| ratio <= rule.odd_log);
+            log.like_the_others = log.differs.is_empty() && is_usual;
         }
         for j in 0..self.goal_error.len() {
             let joint = JointNumber::from_index(j);

@@ -1,6 +1,6 @@
 """A unit against its own past: since when it is another one, with a stated rate of false alarms.
 
-The logs of a unit come by date. ``compare`` asks of each whether it differs from all before it, at the levels
+The logs of a unit come by date. ``compare`` tests whether each differs from all before it, at the levels
 1e-2 to 1e-6; errors of both hold what varies from log to log. While nothing changes it says so in at most the
 share `level` of logs. So
 

@@ -103,6 +103,33 @@ pub(super) struct Asked<'a> {
     pub accept: Accept,
 }
 
+impl Asked<'_> {
+    /// The arm with what is known of it, and the logs with all notes about both.
+    fn read(&self, terminal: &output::Progress) -> Result<(ServoArm, ServoLogs), Failure> {
+        let arm = self.masses.arm(self.arm.0, self.arm.1)?;
+        terminal.say("reading logs");
+        let mut read = ServoLogs::read(self.logs.0, self.logs.1, self.arm.0)?;
+        read.warnings.splice(0..0, self.masses.note(self.arm.1));
+        Ok((arm, read))
+    }
+
+    /// Writes the files of a result and prints it.
+    fn finish(
+        &self,
+        files: &report::Files,
+        words: impl FnOnce() -> String,
+        verbosity: Verbosity,
+    ) -> Result<(), Failure> {
+        output::write_all(files, self.out)?;
+        if self.json {
+            output::print(&files.first());
+        } else if !verbosity.quiet {
+            output::print(&words());
+        }
+        Ok(())
+    }
+}
+
 /// `powerball identify` on logs of position servos.
 pub(super) fn identify(
     asked: &Asked<'_>,
@@ -110,18 +137,11 @@ pub(super) fn identify(
     verbosity: Verbosity,
 ) -> Result<(), Failure> {
     let say = |what: &str| terminal.say(what);
-    let arm = asked.masses.arm(asked.arm.0, asked.arm.1)?;
-    terminal.say("reading logs");
-    let read = ServoLogs::read(asked.logs.0, asked.logs.1, asked.arm.0)?;
+    let (arm, read) = asked.read(terminal)?;
     let mut found = identify_servos(&arm, &read.fit, &read.validate, logs::Progress::to(&say))?;
-    found.warnings.splice(0..0, asked.masses.note(asked.arm.1).into_iter().chain(read.warnings));
+    found.warnings.splice(0..0, read.warnings);
     let files = report::servos::files(&found).map_err(Failure::Refused)?;
-    output::write_all(&files, asked.out)?;
-    if asked.json {
-        output::print(&files.first());
-    } else if !verbosity.quiet {
-        output::print(&in_words(&found, verbosity.verbose, asked.out));
-    }
+    asked.finish(&files, || in_words(&found, verbosity.verbose, asked.out), verbosity)?;
     asked.accept.judge(&found.unusable)
 }
 
@@ -160,19 +180,12 @@ pub(super) fn explain(
     verbosity: Verbosity,
 ) -> Result<(), Failure> {
     let say = |what: &str| terminal.say(what);
-    let arm = asked.masses.arm(asked.arm.0, asked.arm.1)?;
-    terminal.say("reading logs");
-    let read = ServoLogs::read(asked.logs.0, asked.logs.1, asked.arm.0)?;
+    let (arm, read) = asked.read(terminal)?;
     let progress = logs::Progress::to(&say);
     let mut found = explain_servos(&arm, &read.fit, &read.validate, &Rule::default(), progress)?;
-    found.warnings.splice(0..0, asked.masses.note(asked.arm.1).into_iter().chain(read.warnings));
+    found.warnings.splice(0..0, read.warnings);
     let files = report::servos::explained(&found).map_err(Failure::Refused)?;
-    output::write_all(&files, asked.out)?;
-    if asked.json {
-        output::print(&files.first());
-    } else if !verbosity.quiet {
-        output::print(&explained_in_words(&found, verbosity.verbose, asked.out));
-    }
+    asked.finish(&files, || explained_in_words(&found, verbosity.verbose, asked.out), verbosity)?;
     asked.accept.judge(&found.unusable)
 }
 
