@@ -231,7 +231,8 @@ def check_wgsl(files, device, count=1000):
         wgsl = np.abs(run(device, module, files, f, inputs, count) - exact)
         short = next(name for name in sorted(FUNCTIONS, key=len, reverse=True) if f.name.endswith(name))
         bounds = files.rounding[short]["f32"]
-        if None in bounds:
+        # No bound, as of q̈ without the values of the arm: the C in single precision is the measure.
+        if bounds is None or None in bounds:
             single = np.abs(files.single.of(f, inputs) - exact)
             allowed = 5 * np.median(single)
             assert np.median(wgsl) <= allowed, f"{f.name}: {np.median(wgsl)} and not {allowed}"

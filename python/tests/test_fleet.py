@@ -354,7 +354,7 @@ def test_the_variance_from_log_to_log_does_not_see_a_step(rng):
 
 
 def test_evidence_has_its_odds(monkeypatch, rng):
-    """If `compare` is wrong as often as its level states, the mean of a bet is 1: alarms are as rare as stated."""
+    """If `compare` is wrong as often as its level states, the mean of a bet is 1."""
     level_of = {"p": 1.0}
     monkeypatch.setattr(_past, "compare", lambda a, b, level: {"differ": level_of["p"] < level})
     bets = []

@@ -68,7 +68,9 @@ def update(client: dd.Client, job: Job, logs: Sequence[str], retry: bool = False
     todo = [one for one in found if (one.log, one.size, one.stamp) not in done]
 
     start = time.perf_counter()
-    (shared,) = client.scatter([frozenset(known)], broadcast=True)
+    # By a name of its own. Two calls with the same keys would share a name that is made from the content, and
+    # what the first one releases late would be lost for the second one (dask/distributed#3703).
+    (shared,) = client.scatter([frozenset(known)], broadcast=True, hash=False)
     # A worker that dies takes its logs to another one; a log that kills every worker is given up.
     futures = {client.submit(reduce_log, job, one, shared, pure=False, retries=1): one for one in todo}
     outcomes = []
