@@ -120,24 +120,20 @@ def found(report, since):
         assert entry["from_log_to_log"] == pytest.approx(0.03 * level, rel=0.35)
 
 
-def test_a_stopped_run_goes_on_to_the_same_store(small, uninterrupted, client, tmp_path):
-    (arm_file, logs), (whole, _, report) = small, uninterrupted
-    store = tmp_path / "store"
-    command = [
-        sys.executable,
-        "-m",
-        "powerball.fleet",
-        str(logs),
-        "--arm",
-        str(arm_file),
-        "--store",
-        str(store),
-    ]
-    process = subprocess.Popen(command, start_new_session=True)
-    while process.poll() is None and len(list(store.glob("parts/*.parquet"))) < 2:
+def stopped(arm_file, logs, store, after):
+    """Runs the command on ``logs`` and kills it when ``after`` of them are in the store."""
+    words = ["-m", "powerball.fleet", str(logs), "--arm", str(arm_file), "--store", str(store)]
+    process = subprocess.Popen([sys.executable, *words], start_new_session=True)
+    while process.poll() is None and len(list(store.glob("parts/*.parquet"))) < after:
         time.sleep(0.005)
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
+
+
+def test_a_stopped_run_goes_on_to_the_same_store(small, uninterrupted, client, tmp_path):
+    (arm_file, logs), (whole, _, report) = small, uninterrupted
+    store = tmp_path / "store"
+    stopped(arm_file, logs, store, after=2)
     # What a kill between two steps may leave: a row in both places, half a file.
     done = len(list(store.glob("parts/*.parquet")))
     assert 2 <= done < 13
@@ -391,21 +387,7 @@ def test_a_thousand_logs(tmp_path, capsys):
     """Forty units, twenty-five logs of each, two workers; stopped on the way. Says what a log costs."""
     arm_file, logs = synthetic.write_fleet(tmp_path, 40, 25)
     store = tmp_path / "store"
-    command = [
-        sys.executable,
-        "-m",
-        "powerball.fleet",
-        str(logs),
-        "--arm",
-        str(arm_file),
-        "--store",
-        str(store),
-    ]
-    process = subprocess.Popen(command, start_new_session=True)
-    while process.poll() is None and len(list(store.glob("parts/*.parquet"))) < 300:
-        time.sleep(0.05)
-    os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
+    stopped(arm_file, logs, store, after=300)
 
     job = fleet.job(arm_file, str(store))
     with Client(n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0") as client:

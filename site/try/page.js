@@ -191,7 +191,7 @@ async function asked(program, words, folder) {
 
 function shown({ code, seconds, files, out, err }, folder) {
     by("progress").hidden = true;
-    const [tone, meaning] = MEANING[code] || ["bad", "The program broke off."];
+    const [tone, meaning] = MEANING[code] || ["bad", "The program stopped before its end."];
     by("meaning").className = `note ${tone}`;
     by("meaning").textContent = `${meaning} Exit code ${code}, ${seconds.toFixed(1)} s.`;
     by("words").textContent = out.trimEnd();

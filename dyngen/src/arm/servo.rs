@@ -63,20 +63,22 @@ enum Range {
     Share,
 }
 
-/// A key with its unit and range.
-const KEYS: [(&str, &str, Range); 12] = [
-    ("kp", "in the drive's own unit", Range::Positive),
-    ("ki", "kp a second", Range::NotNegative),
-    ("kd", "kp·s", Range::NotNegative),
-    ("gain", "duty for 1 rad or 1 m at kp = 1", Range::Positive),
-    ("dead_zone", "rad or m", Range::NotNegative),
-    ("pwm_limit", "a share of the supply", Range::Share),
-    ("speed_limit", "rad/s or m/s", Range::Positive),
-    ("delay", "s", Range::NotNegative),
-    ("supply", "V", Range::Positive),
-    ("torque_constant", "N·m/A at the joint", Range::Positive),
-    ("resistance", "Ω", Range::Positive),
-    ("armature", "kg·m² or kg", Range::NotNegative),
+/// A key, its unit and range, and where its value stands.
+type Key = (&'static str, &'static str, Range, fn(&mut Servo) -> &mut Option<f64>);
+
+const KEYS: [Key; 12] = [
+    ("kp", "in the drive's own unit", Range::Positive, |s| &mut s.kp),
+    ("ki", "kp a second", Range::NotNegative, |s| &mut s.ki),
+    ("kd", "kp·s", Range::NotNegative, |s| &mut s.kd),
+    ("gain", "duty for 1 rad or 1 m at kp = 1", Range::Positive, |s| &mut s.gain),
+    ("dead_zone", "rad or m", Range::NotNegative, |s| &mut s.dead_zone),
+    ("pwm_limit", "a share of the supply", Range::Share, |s| &mut s.pwm_limit),
+    ("speed_limit", "rad/s or m/s", Range::Positive, |s| &mut s.speed_limit),
+    ("delay", "s", Range::NotNegative, |s| &mut s.delay),
+    ("supply", "V", Range::Positive, |s| &mut s.supply),
+    ("torque_constant", "N·m/A at the joint", Range::Positive, |s| &mut s.torque_constant),
+    ("resistance", "Ω", Range::Positive, |s| &mut s.resistance),
+    ("armature", "kg·m² or kg", Range::NotNegative, |s| &mut s.armature),
 ];
 
 /// Reads `[joint.servo]`.
@@ -88,41 +90,14 @@ pub(super) fn read(reader: &mut Reader<'_>, v: &Value<'_>, place: &str) -> Optio
     };
     let t = Table { table, span: v.span(), place: format!("{place}: servo") };
     reader.unknown_keys(&t, &KEYS.map(|(key, ..)| key));
+    let mut servo = Servo::default();
     let mut sound = true;
-    let values = KEYS.map(|(key, unit, range)| {
+    for (key, unit, range, field) in KEYS {
         let quantity = format!("{place}: servo: {key}");
         let value = reader.optional(&t, key, |r, v| number(r, v, &quantity, unit, range));
         sound &= value.is_some();
-        value.flatten()
-    });
-    let [
-        kp,
-        ki,
-        kd,
-        gain,
-        dead_zone,
-        pwm_limit,
-        speed_limit,
-        delay,
-        supply,
-        torque_constant,
-        resistance,
-        armature,
-    ] = values;
-    let servo = Servo {
-        kp,
-        ki,
-        kd,
-        gain,
-        dead_zone,
-        pwm_limit,
-        speed_limit,
-        delay,
-        supply,
-        torque_constant,
-        resistance,
-        armature,
-    };
+        *field(&mut servo) = value.flatten();
+    }
     sound.then_some(servo)
 }
 

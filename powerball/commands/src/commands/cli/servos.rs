@@ -113,20 +113,29 @@ impl Asked<'_> {
         Ok((arm, read))
     }
 
-    /// Writes the files of a result and prints it.
+    /// Writes the files of a result, prints it around its own lines, and judges whether it should be used.
     fn finish(
         &self,
         files: &report::Files,
-        words: impl FnOnce() -> String,
+        (unusable, warnings): (&[String], &[String]),
+        own_lines: impl FnOnce() -> Vec<String>,
         verbosity: Verbosity,
     ) -> Result<(), Failure> {
         output::write_all(files, self.out)?;
         if self.json {
             output::print(&files.first());
         } else if !verbosity.quiet {
-            output::print(&words());
+            let verbose = verbosity.verbose;
+            let mut lines = output::first_lines(unusable, None, verbose);
+            if verbose {
+                lines.extend(warnings.iter().map(|warning| format!("note: {warning}")));
+            }
+            lines.extend(own_lines());
+            lines.extend(output::notes(warnings.len()).filter(|_| !verbose));
+            lines.push(format!("report: {}", self.out.join("report.html").display()));
+            output::print(&lines.join("\n"));
         }
-        Ok(())
+        self.accept.judge(unusable)
     }
 }
 
@@ -141,17 +150,12 @@ pub(super) fn identify(
     let mut found = identify_servos(&arm, &read.fit, &read.validate, logs::Progress::to(&say))?;
     found.warnings.splice(0..0, read.warnings);
     let files = report::servos::files(&found).map_err(Failure::Refused)?;
-    asked.finish(&files, || in_words(&found, verbosity.verbose, asked.out), verbosity)?;
-    asked.accept.judge(&found.unusable)
+    asked.finish(&files, (&found.unusable, &found.warnings), || in_words(&found), verbosity)
 }
 
 /// What was found, for a person.
-fn in_words(found: &IdentifiedServos, verbose: bool, out: &Path) -> String {
-    let mut lines = output::first_lines(&found.unusable, None, verbose);
-    if verbose {
-        lines.extend(found.warnings.iter().map(|warning| format!("note: {warning}")));
-    }
-    lines.push("joint  position error (simulated closed loop), rad".to_string());
+fn in_words(found: &IdentifiedServos) -> Vec<String> {
+    let mut lines = vec!["joint  position error (simulated closed loop), rad".to_string()];
     for (j, servo) in found.servo.iter().enumerate() {
         let held_out = found.validate.as_ref().map_or(String::new(), |v| {
             format!(
@@ -168,9 +172,7 @@ fn in_words(found: &IdentifiedServos, verbose: bool, out: &Path) -> String {
             servo.parameters.iter().filter(|p| !p.known).map(report::servos::in_words).collect();
         lines.push(format!("       {}", fitted.join(", ")));
     }
-    lines.extend(output::notes(found.warnings.len()).filter(|_| !verbose));
-    lines.push(format!("report: {}", out.join("report.html").display()));
-    lines.join("\n")
+    lines
 }
 
 /// `powerball explain` on logs of position servos.
@@ -185,17 +187,12 @@ pub(super) fn explain(
     let mut found = explain_servos(&arm, &read.fit, &read.validate, &Rule::default(), progress)?;
     found.warnings.splice(0..0, read.warnings);
     let files = report::servos::explained(&found).map_err(Failure::Refused)?;
-    asked.finish(&files, || explained_in_words(&found, verbosity.verbose, asked.out), verbosity)?;
-    asked.accept.judge(&found.unusable)
+    asked.finish(&files, (&found.unusable, &found.warnings), || explained_in_words(&found), verbosity)
 }
 
 /// What was found, for a person.
-fn explained_in_words(found: &ExplainedServos, verbose: bool, out: &Path) -> String {
-    let mut lines = output::first_lines(&found.unusable, None, verbose);
-    if verbose {
-        lines.extend(found.warnings.iter().map(|warning| format!("note: {warning}")));
-    }
-    lines.extend(found.effects.iter().map(report::servos::effect_in_words));
+fn explained_in_words(found: &ExplainedServos) -> Vec<String> {
+    let mut lines: Vec<String> = found.effects.iter().map(report::servos::effect_in_words).collect();
     if found.effects.is_empty() {
         lines.push(
             "nothing is named: no candidate lowers the position error on the validation logs".to_string(),
@@ -211,7 +208,5 @@ fn explained_in_words(found: &ExplainedServos, verbose: bool, out: &Path) -> Str
             verdict.state
         ));
     }
-    lines.extend(output::notes(found.warnings.len()).filter(|_| !verbose));
-    lines.push(format!("report: {}", out.join("report.html").display()));
-    lines.join("\n")
+    lines
 }
