@@ -69,7 +69,7 @@ pub struct ServoEffect {
     pub rms_after: Vec<f64>,
     /// The probability of this change of the error by chance.
     pub p_value: f64,
-    /// The probability that it is there.
+    /// 1 less the probability of chance: that the error changes, and not how often such a name is right.
     pub probability: f64,
     /// The logs that have it, where it is in some only.
     #[serde(skip_serializing_if = "Vec::is_empty")]
