@@ -13,15 +13,19 @@ pub struct Rule {
     /// Effects added at most.
     pub most_steps: usize,
 
-    /// Least score of an effect: e^(−10/2) is a likelihood ratio of 150 after the penalties.
+    /// Least score of an effect, in units of χ²: e^(−10/2) is a likelihood ratio of 150 after the penalties. An
+    /// experiment must promise it, and a log has the payload or the push of another one where that explains
+    /// so much more.
     pub least_score: f64,
-    /// Penalty for each coefficient: what one coefficient gains by chance, twice over (Akaike).
+    /// Penalty for each coefficient: what one coefficient gains by chance, twice over (Akaike). A
+    /// setting is refined for more than half of it.
     pub per_coefficient: f64,
     /// Probability of accepting anything at all where nothing is missing, over all joints and candidates; above
-    /// the band that of a ripple, over all joints and orders.
+    /// the band that of a ripple, over all joints and orders; that of a wrong decision between two names by an
+    /// experiment. A candidate must exceed all but this share of its time-shift surrogates.
     pub family_wise: f64,
     /// The held-out squared error must fall by this share on average over folds: 1 % of the rms, below which
-    /// no user would notice.
+    /// no user would notice. A signal that explains less of a residual's variance is not reported.
     pub least_gain: f64,
     /// … and it must fall at all in this share of the folds: four of five.
     pub folds_that_must_gain: f64,
@@ -43,19 +47,13 @@ pub struct Rule {
     /// … and not more, s.
     pub longest_block: f64,
 
-    /// Share of the time-shift surrogates whose score a candidate must exceed.
-    pub surrogate_level: f64,
-    /// The same for events of some seconds: shifted in time they fall onto others of their kind for at most a quarter of
-    /// a log.
+    /// Share of its time-shift surrogates whose score an event of some seconds must exceed: shifted in time it
+    /// falls onto others of its kind for at most a quarter of a log.
     pub event_surrogate_level: f64,
-    /// Surrogates that a step asks.
-    pub step_surrogates: usize,
-    /// Those for which an effect's search for logs and times is done again.
+    /// Surrogates of a step, and those that state the false-positive rate.
+    pub surrogates: usize,
+    /// Those for which a search is done again: an effect's for logs and times, that for ripple above the band.
     pub searched_surrogates: usize,
-    /// Surrogates that state the false-positive rate.
-    pub final_surrogates: usize,
-    /// Those that judge ripple above the band.
-    pub peak_surrogates: usize,
     /// A shifted column that still correlates so much with the unshifted one (a periodic motion) is no
     /// surrogate.
     pub surrogate_correlation: f64,
@@ -85,23 +83,20 @@ pub struct Rule {
     /// share is that of an earlier trial on other data. What is in validation logs only must leave no more of
     /// their excess over the fitted logs.
     pub max_unexplained: f64,
-    /// An event of some seconds (a push) is not given where more than this share of what its time has more than others
-    /// of squared error stays: what explains less than half of it is something else.
-    pub event_left: f64,
-    /// An effect of which this share is missing in some octave, and by more than
-    /// [`missing_errors`](Self::missing_errors), is not the effect that it is called: most of it is not
-    /// there.
-    pub least_missing: f64,
-    /// See [`least_missing`](Self::least_missing): standard errors that chance exceeds once in 800,
+    /// Half, and more than it is most. An event of some seconds (a push) must explain most of what its time has
+    /// more of squared error than others; another log has the same push where it has it for most of its
+    /// time; an effect most of which is missing in some octave, by more than
+    /// [`missing_errors`](Self::missing_errors), is not the effect that it is called.
+    pub most: f64,
+    /// See [`most`](Self::most): standard errors that chance exceeds once in 800,
     /// [`family_wise`](Self::family_wise) over eight octaves.
     pub missing_errors: f64,
-
-    /// A name is taken back where without its effect the squared error on the validation set is smaller on its joints, or by
-    /// this share on all together. What is in validation logs only must not raise that of any joint by this share.
-    pub max_validation_loss: f64,
-
-    /// A setting is refined for more than chance gains by one more coefficient, in units of χ².
-    pub refinement_gain: f64,
+    /// A change of the held-out squared error by this share, 5 % of the rms, is clear. A name is taken back
+    /// where without its effect that error is smaller on its joints, or by this share on all together; what
+    /// is in validation logs only must not raise that of any joint by it; and on repeats of one path, where
+    /// whoever has more parameters fits the error that is the same in all of them, the per-joint fit is taken
+    /// only where it lowers it by more.
+    pub clear_change: f64,
 
     /// Two recordings are one path where their positions over time correlate more than this: a path that
     /// drifts with warmth keeps its shape, and two different paths hardly correlate.
@@ -109,40 +104,27 @@ pub struct Rule {
     /// A ripple with fewer cycles along the path than this is as good as any other smooth function of the
     /// position.
     pub few_cycles: f64,
-    /// On repeats of one path an error that is the same in all of them is fitted by whoever has more parameters;
-    /// the per-joint fit is taken only where it lowers the held-out squared error by more than this share, 5
-    /// % of the rms.
-    pub clearly_better: f64,
     /// Two runs start at the same place where every joint does to this share of its travel in all logs.
     pub same_start: f64,
 
     /// A validation log whose squared error is this many times that of the fitted logs holds something that
     /// they do not.
     pub odd_log: f64,
-    /// A log has the same payload if that explains this much more, and has it not if that explains this much
-    /// more (in units of χ²). The same for a push.
-    pub another_log: f64,
     /// A log has the same push if that also explains this share of the force's own torque: a push of another
     /// size or direction is another one.
     pub same_force: f64,
-    /// … over at least this share of the time that it lasted: another push resembles this one for a moment
-    /// only.
-    pub same_time: f64,
 
     /// A residual of this many times the noise floor is looked at for what it depends on …
     pub above_floor: f64,
     /// … where the variance of its slow means exceeds that of white noise by this factor.
     pub coloured: f64,
-    /// Least share of a residual's variance that a signal must explain to be named as one that it depends on.
-    pub least_share: f64,
 
     /// A joint is predicted where no more than this share of its torque's rms is left on the validation set.
+    /// Where no more than this share is not left, a model predicts next to nothing.
     pub predicted_share: f64,
     /// What is left of a joint below this share of its torque needs no name, whatever it depends on: a law that is missing
     /// often leaves less than [`predicted_share`](Self::predicted_share).
     pub little_share: f64,
-    /// Where more than this share is left a model predicts next to nothing.
-    pub nothing_share: f64,
 
     /// Below this time of motion a reader is warned that the folds are too short to tell much, s.
     pub least_time: f64,
@@ -150,12 +132,8 @@ pub struct Rule {
     /// for, and a reader is warned.
     pub many_accepted: f64,
 
-    /// Probability of a wrong decision between two names by an experiment.
-    pub decision_level: f64,
     /// Two names whose models differ by less than this share of what either explains say the same.
     pub same_model: f64,
-    /// A difference of this many units of χ² can be seen through the noise: a likelihood ratio of 150.
-    pub visible: f64,
 }
 
 impl Default for Rule {
@@ -174,12 +152,9 @@ impl Default for Rule {
             block_memories: 3.0,
             shortest_block: 0.5,
             longest_block: 2.0,
-            surrogate_level: 0.99,
             event_surrogate_level: 0.75,
-            step_surrogates: 2000,
+            surrogates: 2000,
             searched_surrogates: 200,
-            final_surrogates: 2000,
-            peak_surrogates: 200,
             surrogate_correlation: 0.4,
             only_corrects_class: 0.15,
             only_corrects_any: 0.05,
@@ -189,30 +164,21 @@ impl Default for Rule {
             least_margin: 1.1,
             same_part: 0.9,
             max_unexplained: 0.35,
-            event_left: 0.5,
-            least_missing: 0.5,
+            most: 0.5,
             missing_errors: 3.2,
-            max_validation_loss: 0.1,
-            refinement_gain: 1.0,
+            clear_change: 0.1,
             same_path: 0.9,
             few_cycles: 5.0,
-            clearly_better: 0.1,
             same_start: 0.05,
             odd_log: 2.0,
-            another_log: 10.0,
             same_force: 0.8,
-            same_time: 0.5,
             above_floor: 1.2,
             coloured: 2.0,
-            least_share: 0.02,
             predicted_share: 0.1,
             little_share: 0.05,
-            nothing_share: 0.9,
             least_time: 30.0,
             many_accepted: 0.05,
-            decision_level: 0.01,
             same_model: 0.1,
-            visible: 10.0,
         }
     }
 }
@@ -266,7 +232,7 @@ impl Rule {
     }
 
     /// What is a probability, a correlation or a share of a whole.
-    fn shares(&self) -> [(&'static str, f64); 23] {
+    fn shares(&self) -> [(&'static str, f64); 17] {
         [
             ("least_gain", self.least_gain),
             ("large_gain", self.large_gain),
@@ -275,22 +241,16 @@ impl Rule {
             ("as_good", self.as_good),
             ("same_part", self.same_part),
             ("max_unexplained", self.max_unexplained),
-            ("event_left", self.event_left),
-            ("least_missing", self.least_missing),
-            ("max_validation_loss", self.max_validation_loss),
+            ("most", self.most),
             ("same_force", self.same_force),
-            ("same_time", self.same_time),
-            ("least_share", self.least_share),
             ("predicted_share", self.predicted_share),
             ("many_accepted", self.many_accepted),
             ("family_wise", self.family_wise),
             ("folds_that_must_gain", self.folds_that_must_gain),
             ("least_correlation", self.least_correlation),
-            ("surrogate_level", self.surrogate_level),
             ("event_surrogate_level", self.event_surrogate_level),
             ("surrogate_correlation", self.surrogate_correlation),
             ("same_path", self.same_path),
-            ("decision_level", self.decision_level),
         ]
     }
 }

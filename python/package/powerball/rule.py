@@ -20,15 +20,19 @@ class Rule:
 
     #: Effects added at most.
     most_steps: int = 12
-    #: Least score of an effect: e^(−10/2) is a likelihood ratio of 150 after the penalties.
+    #: Least score of an effect, in units of χ²: e^(−10/2) is a likelihood ratio of 150 after the penalties.
+    #: An experiment must promise it, and a log has the payload or the push of another one where that
+    #: explains so much more.
     least_score: float = 10.0
-    #: Penalty for each coefficient: what one coefficient gains by chance, twice over (Akaike).
+    #: Penalty for each coefficient: what one coefficient gains by chance, twice over (Akaike). A setting is
+    #: refined for more than half of it.
     per_coefficient: float = 2.0
     #: Probability of accepting anything at all where nothing is missing, over all joints and candidates;
-    #: above the band that of a ripple, over all joints and orders.
+    #: above the band that of a ripple, over all joints and orders; that of a wrong decision between two
+    #: names by an experiment. A candidate must exceed all but this share of its time-shift surrogates.
     family_wise: float = 0.01
     #: The held-out squared error must fall by this share on average over folds: 1 % of the rms, below which
-    #: no user would notice.
+    #: no user would notice. A signal that explains less of a residual's variance is not reported.
     least_gain: float = 0.02
     #: … and it must fall at all in this share of the folds: four of five.
     folds_that_must_gain: float = 0.8
@@ -48,19 +52,14 @@ class Rule:
     shortest_block: float = 0.5
     #: … and not more, s.
     longest_block: float = 2.0
-    #: Share of the time-shift surrogates whose score a candidate must exceed.
-    surrogate_level: float = 0.99
-    #: The same for events of some seconds: shifted in time they fall onto others of their kind for at most
-    #: a quarter of a log.
+    #: Share of its time-shift surrogates whose score an event of some seconds must exceed: shifted in time
+    #: it falls onto others of its kind for at most a quarter of a log.
     event_surrogate_level: float = 0.75
-    #: Surrogates that a step asks.
-    step_surrogates: int = 2000
-    #: Those for which an effect's search for logs and times is done again.
+    #: Surrogates of a step, and those that state the false-positive rate.
+    surrogates: int = 2000
+    #: Those for which a search is done again: an effect's for logs and times, that for ripple above the
+    #: band.
     searched_surrogates: int = 200
-    #: Surrogates that state the false-positive rate.
-    final_surrogates: int = 2000
-    #: Those that judge ripple above the band.
-    peak_surrogates: int = 200
     #: A shifted column that still correlates so much with the unshifted one (a periodic motion) is no
     #: surrogate.
     surrogate_correlation: float = 0.4
@@ -88,70 +87,50 @@ class Rule:
     #: trial on other data. What is in validation logs only must leave no more of their excess over the
     #: fitted logs.
     max_unexplained: float = 0.35
-    #: An event of some seconds (a push) is not given where more than this share of what its time has more
-    #: than others of squared error stays: what explains less than half of it is something else.
-    event_left: float = 0.5
-    #: An effect of which this share is missing in some octave, and by more than ``missing_errors``, is not
-    #: the effect that it is called: most of it is not there.
-    least_missing: float = 0.5
-    #: See ``least_missing``: standard errors that chance exceeds once in 800, ``family_wise`` over eight
-    #: octaves.
+    #: Half, and more than it is most. An event of some seconds (a push) must explain most of what its time
+    #: has more of squared error than others; another log has the same push where it has it for most of its
+    #: time; an effect most of which is missing in some octave, by more than ``missing_errors``, is not the
+    #: effect that it is called.
+    most: float = 0.5
+    #: See ``most``: standard errors that chance exceeds once in 800, ``family_wise`` over eight octaves.
     missing_errors: float = 3.2
-    #: A name is taken back where without its effect the squared error on the validation set is smaller on
-    #: its joints, or by this share on all together. What is in validation logs only must not raise that of
-    #: any joint by this share.
-    max_validation_loss: float = 0.1
-    #: A setting is refined for more than chance gains by one more coefficient, in units of χ².
-    refinement_gain: float = 1.0
+    #: A change of the held-out squared error by this share, 5 % of the rms, is clear. A name is taken back
+    #: where without its effect that error is smaller on its joints, or by this share on all together; what
+    #: is in validation logs only must not raise that of any joint by it; and on repeats of one path, where
+    #: whoever has more parameters fits the error that is the same in all of them, the per-joint fit is
+    #: taken only where it lowers it by more.
+    clear_change: float = 0.1
     #: Two recordings are one path where their positions over time correlate more than this: a path that
     #: drifts with warmth keeps its shape, and two different paths hardly correlate.
     same_path: float = 0.9
     #: A ripple with fewer cycles along the path than this is as good as any other smooth function of the
     #: position.
     few_cycles: float = 5.0
-    #: On repeats of one path an error that is the same in all of them is fitted by whoever has more
-    #: parameters; the per-joint fit is taken only where it lowers the held-out squared error by more than
-    #: this share, 5 % of the rms.
-    clearly_better: float = 0.1
     #: Two runs start at the same place where every joint does to this share of its travel in all logs.
     same_start: float = 0.05
     #: A validation log whose squared error is this many times that of the fitted logs holds something that
     #: they do not.
     odd_log: float = 2.0
-    #: A log has the same payload if that explains this much more, and has it not if that explains this much
-    #: more (in units of χ²). The same for a push.
-    another_log: float = 10.0
     #: A log has the same push if that also explains this share of the force's own torque: a push of another
     #: size or direction is another one.
     same_force: float = 0.8
-    #: … over at least this share of the time that it lasted: another push resembles this one for a moment
-    #: only.
-    same_time: float = 0.5
     #: A residual of this many times the noise floor is looked at for what it depends on …
     above_floor: float = 1.2
     #: … where the variance of its slow means exceeds that of white noise by this factor.
     coloured: float = 2.0
-    #: Least share of a residual's variance that a signal must explain to be named as one that it depends
-    #: on.
-    least_share: float = 0.02
     #: A joint is predicted where no more than this share of its torque's rms is left on the validation set.
+    #: Where no more than this share is not left, a model predicts next to nothing.
     predicted_share: float = 0.1
     #: What is left of a joint below this share of its torque needs no name, whatever it depends on: a law
     #: that is missing often leaves less than ``predicted_share``.
     little_share: float = 0.05
-    #: Where more than this share is left a model predicts next to nothing.
-    nothing_share: float = 0.9
     #: Below this time of motion a reader is warned that the folds are too short to tell much, s.
     least_time: float = 30.0
     #: A share of accepted surrogates above this is no chance: the residuals are not what the tests take
     #: them for, and a reader is warned.
     many_accepted: float = 0.05
-    #: Probability of a wrong decision between two names by an experiment.
-    decision_level: float = 0.01
     #: Two names whose models differ by less than this share of what either explains say the same.
     same_model: float = 0.1
-    #: A difference of this many units of χ² can be seen through the noise: a likelihood ratio of 150.
-    visible: float = 10.0
 
 
 def rule_text(rule: Rule) -> str:

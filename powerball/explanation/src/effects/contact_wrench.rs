@@ -174,8 +174,8 @@ impl Effect for ContactWrench {
                 let found = stretch.start + found.start..stretch.start + found.end;
                 let (less, own) =
                     explains[found.clone()].iter().fold((0.0, 0.0), |sum, e| (sum.0 + e.0, sum.1 + e.1));
-                let as_long = found.len() as f64 * FINE > rule.same_time * lasted;
-                if less > rule.another_log + chance && less > rule.same_force * own && as_long {
+                let as_long = found.len() as f64 * FINE > rule.most * lasted;
+                if less > rule.least_score + chance && less > rule.same_force * own && as_long {
                     seen.windows.push(window(context, &steps, &log, &found)?);
                     open.extend([stretch.start..found.start, found.end..stretch.end]);
                 }

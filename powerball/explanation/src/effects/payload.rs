@@ -189,7 +189,7 @@ impl Effect for Payload {
     /// tested by itself; the clocks are overruled if the log clearly contradicts them, as for the fitted
     /// logs.
     fn seen_in(&self, context: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Option<Candidate> {
-        let (data, another_log) = (context.data, context.rule.another_log);
+        let (data, least) = (context.data, context.rule.least_score);
         let taken = self.windows(context, candidate);
         let (mut seen, settings) = (candidate.clone(), *Settings::of(candidate)?);
         seen.windows.retain(|w| !data.logs.contains(&w.log));
@@ -201,9 +201,9 @@ impl Effect for Payload {
             let sum =
                 |steps: &Range<usize>| explains[steps.clone()].iter().map(|(less, _)| less).sum::<f64>();
             let was = taken.iter().any(|w| w.log == data.logs[steps[log.start].log]);
-            let all = sum(&log) + if was { another_log } else { -another_log };
+            let all = sum(&log) + if was { least } else { -least };
             // A beginning and an end are searched for: they must explain more than the best of all runs by chance.
-            let part = sum(&run) - another_log - 4.0 * (log.len() as f64).ln();
+            let part = sum(&run) - least - 4.0 * (log.len() as f64).ln();
             let held = if long_enough(&run, &log, FINE) && part > all.max(0.0) { run } else { log.clone() };
             if held != log || all > 0.0 {
                 seen.windows.push(lasting_window(context, &steps, &log, &held)?);
@@ -299,7 +299,7 @@ fn search(context: &Context<'_>, link: Option<usize>) -> Option<Candidate> {
         .map(|(place, log)| (place, held.best(log)))
         .max_by(|(_, a), (_, b)| a.0.total_cmp(&b.0))
     {
-        let least = if chosen.is_empty() { 0.0 } else { held.explained + context.rule.another_log };
+        let least = if chosen.is_empty() { 0.0 } else { held.explained + context.rule.least_score };
         if gain <= least {
             break;
         }

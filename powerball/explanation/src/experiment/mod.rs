@@ -27,7 +27,7 @@ pub fn propose(body: &RigidArm, explained: &mut Explained, options: &ExplainOpti
     let next = explained.next_experiment.as_mut()?;
     match designed {
         Ok(design) => {
-            next.advice = advice(&open, &design, options.rule.visible);
+            next.advice = advice(&open, &design, options.rule.least_score);
             next.trajectory = Trajectory::Designed {
                 joints: open.hypotheses[0].joints.clone(),
                 trajectory: TRAJECTORY,

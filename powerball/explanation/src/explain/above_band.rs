@@ -106,7 +106,7 @@ fn search(study: &Study<'_>, model: &Model) -> Vec<Ripple> {
             if gain.min(wave.gain(&fitted[j])) < rule.least_gain {
                 break;
             }
-            let chance = chance.get_or_insert_with(|| heights_by_chance(&fitted, rule.peak_surrogates));
+            let chance = chance.get_or_insert_with(|| heights_by_chance(&fitted, rule.searched_surrogates));
             let above = chance.iter().filter(|height| **height >= peak.height).count();
             let p_value = (1 + above) as f64 / (1 + chance.len()) as f64;
             if p_value > rule.family_wise {

@@ -6,8 +6,9 @@
 use super::model::Model;
 use super::study::Study;
 use crate::effects::{self, Context, Settings, temperature};
+use faer::Mat;
 use powerball_controller::JointNumber;
-use powerball_identification::estimate::distribution::f_tail;
+use powerball_identification::estimate::blocks::p_of_coefficients;
 use powerball_identification::estimate::{Design, Folds, Gram, Solver, friction_columns};
 use powerball_logs::parallel;
 use powerball_logs::regression::{Column, Data, Signals};
@@ -169,11 +170,8 @@ fn share(
 
 /// The probability of such a coefficient by chance: blocks of all logs as clusters.
 fn by_chance(together: &Together<'_>, asked: &Asked) -> f64 {
-    let sums = together.by_block(asked);
-    let meat: f64 = sums.iter().map(|s| s * s).sum();
-    let square = asked.gain / asked.theta.powi(2);
-    let wald = (asked.theta * square).powi(2) / meat.max(f64::MIN_POSITIVE);
-    f_tail(wald, 1.0, sums.len() as f64 - 1.0)
+    let square = Mat::from_fn(1, 1, |_, _| asked.gain / asked.theta.powi(2));
+    p_of_coefficients(&[asked.theta], &square, &together.by_block(asked))
 }
 
 /// Whether a coefficient is unlike those of other logs.
@@ -290,7 +288,7 @@ impl<'s> Together<'s> {
 
     /// The sums over blocks of all logs of a column times the residual with it: their variation shows
     /// how surely its coefficient is known.
-    pub(crate) fn by_block(&self, asked: &Asked) -> Vec<f64> {
+    pub(crate) fn by_block(&self, asked: &Asked) -> Vec<Vec<f64>> {
         let mut sums = Vec::new();
         for (side, data) in self.data.iter().enumerate() {
             for block in &data.blocks {
@@ -299,7 +297,7 @@ impl<'s> Together<'s> {
                         (&self.residual[side][j][rows.clone()], &asked.column[side][j][rows.clone()]);
                     self.weights[j] * (dot(c, r) - asked.theta * dot(c, c))
                 };
-                sums.push(block.rows.iter().enumerate().map(of).sum());
+                sums.push(vec![block.rows.iter().enumerate().map(of).sum()]);
             }
         }
         sums

@@ -152,7 +152,7 @@ pub(super) fn odd(sizes: &[[Option<Size>; 2]], fitted: usize, rule: &Rule) -> Ve
         let clear = |change: &Change| {
             of[*change as usize].is_some_and(|size| {
                 ratio.is_some_and(|ratio| ratio > rule.odd_log)
-                    && size.left() <= rule.event_left
+                    && size.left() <= 1.0 - rule.most
                     && size.is_clear(*change, spreads[*change as usize])
             })
         };
@@ -207,7 +207,7 @@ pub(super) fn join(
         for k in 0..each.len() {
             let Some(alone) = sizes[k][*change as usize].filter(|_| changes[k].is_none()) else { continue };
             let with = objective(&changed(&each[k], *change, size.value));
-            if with <= rule.event_left * alone.before && alone.is_clear(*change, spread) {
+            if with <= (1.0 - rule.most) * alone.before && alone.is_clear(*change, spread) {
                 changes[k] = Some(*change);
                 own.push(k);
             }

@@ -106,7 +106,7 @@ fn find_harmful(study: &Study<'_>, model: &Model) -> Option<usize> {
     found.into_iter().find(|k| {
         let joints = &model.accepted[*k].candidate.joints;
         let without = model.without(study, *k).residual_on_validation(study);
-        [(joints, 0.0), (&all, study.rule().max_validation_loss)]
+        [(joints, 0.0), (&all, study.rule().clear_change)]
             .iter()
             .any(|(on, loss)| error(&without, on) < error(&with, on) - loss)
     })
@@ -173,8 +173,8 @@ pub(crate) fn inconstant(study: &Study<'_>, model: &Model) -> Option<usize> {
     let sizes: Vec<ByOctave> =
         model.places().into_iter().map(|own| by_octave(study, model, &gram, own)).collect();
     let missing = |(change, error): &(f64, f64)| {
-        let least = rule.least_missing.max(rule.missing_errors * error);
-        (least..2.0 - rule.least_missing).contains(&-change)
+        let least = rule.most.max(rule.missing_errors * error);
+        (least..2.0 - rule.most).contains(&-change)
     };
     let judged = |a: &usize| !model.accepted[*a].is_baseline() && !model.accepted[*a].effect().abrupt();
     (0..sizes.len()).rev().filter(judged).find(|a| sizes[*a].iter().any(missing))

@@ -209,7 +209,7 @@ pub(crate) fn depends_on(context: &Context<'_>, joint: usize) -> Vec<(String, f6
     for (name, signal) in signals(context, joint) {
         let bins = quantile_bins(&signal, BINS);
         let share = explained_share(&bins, residual);
-        if share < context.rule.least_share {
+        if share < context.rule.least_gain {
             continue;
         }
         let chance = (0..SHIFTS)

@@ -112,7 +112,7 @@ pub(super) fn needs_no_name(study: &Study<'_>, after: &ResidualStats, floor: &[f
 /// Likely causes and advice for a joint with a large remaining error.
 fn advice(study: &Study<'_>, j: usize, left: f64, over_noise: f64, dependencies: &Dependencies) -> String {
     let mut parts: Vec<String> = Vec::new();
-    if left > study.rule().nothing_share {
+    if left > 1.0 - study.rule().predicted_share {
         parts.push(
             "the model predicts almost nothing of this torque on other paths: check the sign, unit and \
                 order of the column, that the arm file belongs to this arm, and that the logs excite the \

@@ -252,7 +252,7 @@ fn moved(
         }
         let trials = parallel::map(&others, |c| screen.try_candidate(c));
         let tried = others.into_iter().zip(trials).filter_map(|(c, t)| Some((c, t?)));
-        let least = best.score + study.rule().refinement_gain;
+        let least = best.score + 0.5 * study.rule().per_coefficient;
         match tried.max_by(|a, b| a.1.score.total_cmp(&b.1.score)) {
             Some((c, trial)) if trial.score > least => (candidate, best) = (c, trial),
             _ => break,

@@ -7,10 +7,9 @@ use crate::effects::Candidate;
 use crate::rule::Rule;
 use faer::Mat;
 use powerball_controller::JointNumber;
+use powerball_identification::estimate::blocks::p_of_coefficients;
 use powerball_identification::estimate::distribution::f_tail;
-use powerball_identification::estimate::{
-    Design, Folds, MEAN_OVER, NormalEquations, Solver, variance_inflation,
-};
+use powerball_identification::estimate::{Design, Folds, MEAN_OVER, NormalEquations, variance_inflation};
 use powerball_logs::regression::{Block, Column, Data, Signals};
 use powerball_logs::vector::dot;
 
@@ -105,16 +104,14 @@ pub(crate) fn evidence(
     }
 }
 
-/// The Wald test of the coefficients with blocks as clusters: within a block residuals may depend on each
-/// other.
+/// The test of a trial's coefficients between blocks.
 pub(crate) fn wald(screen: &Screen<'_>, trial: &Trial, blocks: &[Block]) -> f64 {
     let fit = screen.context.fit;
     let k = trial.columns.len();
     let columns = screen.residualised(trial);
     let mut square = Mat::<f64>::zeros(k, k);
-    let mut meat = Mat::<f64>::zeros(k, k);
     let after = left(screen, trial, &columns);
-    let mut clusters = 0.0;
+    let mut scores = Vec::new();
     for block in blocks {
         let mut score = vec![0.0; k];
         let mut touched = false;
@@ -133,12 +130,7 @@ pub(crate) fn wald(screen: &Screen<'_>, trial: &Trial, blocks: &[Block]) -> f64 
             touched = true;
         }
         if touched {
-            clusters += 1.0;
-        }
-        for a in 0..k {
-            for b in 0..k {
-                meat[(a, b)] += score[a] * score[b];
-            }
+            scores.push(score);
         }
     }
     for a in 0..k {
@@ -146,16 +138,7 @@ pub(crate) fn wald(screen: &Screen<'_>, trial: &Trial, blocks: &[Block]) -> f64 
             square[(b, a)] = square[(a, b)];
         }
     }
-    // Wald: θ' S M⁻¹ S θ with S the residualised gram and M the sum over clusters.
-    let s: Vec<f64> = (0..k).map(|a| (0..k).map(|b| square[(a, b)] * trial.theta[b]).sum()).collect();
-    let used = trial.theta.iter().filter(|t| **t != 0.0).count() as f64;
-    let solver = Solver::new(&meat, |a| trial.theta[a] != 0.0);
-    let wald = dot(&s, &solver.solve(&s));
-    let freedom = clusters - used;
-    if freedom < 3.0 || used == 0.0 {
-        return 1.0;
-    }
-    f_tail(wald / used * freedom / clusters, used, freedom)
+    p_of_coefficients(&trial.theta, &square, &scores)
 }
 
 /// The residual of a trial, given its columns without the base's shares.
@@ -352,7 +335,7 @@ pub(crate) fn refusal(rule: &Rule, evidence: &Evidence, tests: f64, local: bool)
         return Some(format!("one held-out fold is {:.0} % worse", -100.0 * worst));
     }
     // A push is where errors are larger than elsewhere, and explains that.
-    if let Some(left) = evidence.event_left.filter(|left| *left > rule.event_left) {
+    if let Some(left) = evidence.event_left.filter(|left| *left > 1.0 - rule.most) {
         return Some(match left.is_finite() {
             true => {
                 format!("leaves {:.0} % of the additional squared error of its time", 100.0 * left)

@@ -37,8 +37,8 @@ struct Surrogate {
 #[must_use]
 pub(crate) fn level_by_chance(screen: &Screen<'_>, trials: &[&Trial], short: bool, seed: u64) -> f64 {
     let rule = screen.context.rule;
-    let draws = draw(screen, trials, rule.step_surrogates, seed);
-    let share = if short { rule.event_surrogate_level } else { rule.surrogate_level };
+    let draws = draw(screen, trials, rule.surrogates, seed);
+    let share = if short { rule.event_surrogate_level } else { 1.0 - rule.family_wise };
     exceeded(draws.into_iter().flatten().map(|s| s.score).collect(), share)
 }
 
@@ -102,7 +102,7 @@ pub(crate) fn level_of_search(context: &Context<'_>, effect: &dyn Effect, seed: 
         let scores = candidates.iter().filter_map(|c| Some(screen.try_candidate(c)?.score));
         scores.fold(0.0, f64::max)
     });
-    exceeded(scores, context.rule.surrogate_level)
+    exceeded(scores, 1.0 - context.rule.family_wise)
 }
 
 /// Asks surrogates of every kind on the final residual: where nothing is missing any more, what passes is
@@ -129,7 +129,7 @@ pub(crate) fn false_positives(study: &Study<'_>, model: &Model) -> FalsePositive
         })
     };
     let drawn: Vec<&Trial> = trials.iter().map(|(trial, _)| *trial).collect();
-    let draws = draw(&screen, &drawn, rule.final_surrogates, FINAL_SEED);
+    let draws = draw(&screen, &drawn, rule.surrogates, FINAL_SEED);
     let found: Vec<&Surrogate> = draws.iter().flatten().collect();
     // A candidate that scores too little is refused by that alone.
     let high: Vec<&Surrogate> = found.iter().copied().filter(|s| s.score >= rule.least_score).collect();

@@ -59,7 +59,7 @@ pub(crate) fn predicts_better(model: (&Study<'_>, &Model), rival: (&Study<'_>, &
             rows += n;
         }
     }
-    log_ratio < rows * (1.0 - model.0.rule().clearly_better).ln()
+    log_ratio < rows * (1.0 - model.0.rule().clear_change).ln()
 }
 
 // When logs were recorded, if their times do not show it.

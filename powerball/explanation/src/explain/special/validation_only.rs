@@ -376,6 +376,5 @@ fn makes_it_odd(
         |residual: &[Vec<f64>]| -> f64 { logs().map(|log| oddness(base, other, residual, log) - 1.0).sum() };
     let little = excess(&left) <= rule.max_unexplained * excess(residual);
     let (after, before) = (left.squares(), residual.squares());
-    little
-        && !after.iter().zip(before).any(|(after, before)| *after > (1.0 + rule.max_validation_loss) * before)
+    little && !after.iter().zip(before).any(|(after, before)| *after > (1.0 + rule.clear_change) * before)
 }
