@@ -35,13 +35,17 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let model = model(&args.arm)?;
     let set = model.set(SetKind::Minimal).map_err(Failure::refused)?;
-    let values = match &args.values {
-        Some(file) => Some(Values::read(file).and_then(|v| v.of_set(&model, set)).map_err(Failure::input)?),
-        None => None,
-    };
+    let (mut values, mut links) = (None, None);
+    if let Some(file) = &args.values {
+        let given = Values::read(file).map_err(Failure::input)?;
+        values = Some(given.of_set(&model, set).map_err(Failure::input)?);
+        // Sums of parameters determine no link.
+        links = model.set(SetKind::Full).ok().and_then(|full| given.of_set(&model, full).ok());
+    }
     let progress = Progress::new(model.arm());
-    let description = Description::with_progress(&model, values.as_deref(), |what| progress.say(what))
-        .map_err(Failure::refused)?;
+    let description =
+        Description::with_progress(&model, values.as_deref(), links.as_deref(), |what| progress.say(what))
+            .map_err(Failure::refused)?;
     drop(progress);
     let digits = if args.exact { Digits::All } else { Digits::Six };
     let text = match args.json {

@@ -39,17 +39,18 @@ impl Description {
     /// # Errors
     /// As [`Model::function`].
     pub fn of(model: &Model) -> Result<Description, Error> {
-        Description::with_progress(model, None, |_| {})
+        Description::with_progress(model, None, None, |_| {})
     }
 
     /// As [`Self::of`], with progress reported; with bounds of rounding for these `values` of the
-    /// minimal set, where there are any.
+    /// minimal set, where there are any, and those of the full set, `links`, where they are known too.
     ///
     /// # Errors
     /// As [`Model::function`].
     pub fn with_progress(
         model: &Model,
         values: Option<&[f64]>,
+        links: Option<&[f64]>,
         say: impl Fn(&str),
     ) -> Result<Description, Error> {
         let mut preparation = Preparation::default();
@@ -57,7 +58,7 @@ impl Description {
         let mut rounding = Rounding::of(model.arm(), values);
         let functions: Vec<Function> = model.functions(SetKind::Minimal).collect();
         let bounded = rounding.is_some();
-        let bounder = Bounder::new(model, values);
+        let bounder = Bounder::new(model, values).with_links(links);
         let of = |function: Function| {
             let built = model.function(function, SetKind::Minimal)?;
             let bounds = bounded.then(|| bounder.bounds(&built));

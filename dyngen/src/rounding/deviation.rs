@@ -4,8 +4,9 @@
 //! and, forwards from its operands, how far the emitted one may be off (running error analysis, Higham 2002, §3.3). The
 //! derivatives by each rounding are operations like the others: at every t·δ they are within the same two.
 
+use super::energy::Solves;
 use super::interval::Interval;
-use super::known::Known;
+use super::known::{Known, KnownProgram};
 use super::precision::PRECISIONS;
 use super::program::{EXACT, Errors, Operation, Program, TINY, Workspace};
 
@@ -13,7 +14,7 @@ impl Program {
     /// As [`Program::errors`]; `None` where there is no bound.
     pub(super) fn errors_from_exact(
         &self,
-        known: &[Option<Known>],
+        KnownProgram { known, solves }: &KnownProgram,
         ranges: &[Interval],
         workspace: &mut Workspace,
     ) -> Option<Errors> {
@@ -21,6 +22,7 @@ impl Program {
         values.clear();
         errors.clear();
         deviations.clear();
+        let mut running = solves.as_ref().map(Solves::start);
         for (k, operation) in self.operations.iter().enumerate() {
             let (value, from_operands) = self.exact(*operation, ranges, values, deviations)?;
             let mut error = match *operation {
@@ -47,10 +49,18 @@ impl Program {
                     value.clamped(most * (1.0 + 1e-12))
                 }
             };
-            let deviation = [0, 1].map(|p| (from_operands[p] + error[p]) * GROWN);
-            let most = value.magnitude() + deviation[0];
-            if most >= f64::from(f32::MAX) || most.is_nan() {
+            let mut deviation = [0, 1].map(|p| no_number_is_infinite((from_operands[p] + error[p]) * GROWN));
+            if value.magnitude().is_nan() {
                 return None;
+            }
+            if value.magnitude() + deviation[0] >= f64::from(f32::MAX) {
+                deviation[0] = f64::INFINITY;
+            }
+            if let (Some(solves), Some(running)) = (solves, &mut running)
+                && k < self.emitted
+            {
+                let own = (value, deviation, error);
+                (value, deviation) = solves.take(running, *operation, own, (values, deviations));
             }
             values.push(value);
             deviations.push(deviation);
@@ -66,7 +76,7 @@ impl Program {
         // Of two bounds the smaller; a sum of n terms rounds n times.
         let grown = 1.0 + self.len() as f64 * f64::EPSILON;
         let forwards = deviations[self.emitted - 1];
-        Some([0, 1].map(|p| (total[p] * grown).min(forwards[p])))
+        Some([0, 1].map(|p| no_number_is_infinite((total[p] * grown).min(forwards[p]))))
     }
 
     /// The exact value, its ends rounded, and by how much the emitted operands move the result.
@@ -100,12 +110,17 @@ impl Program {
                 let moved = |p: usize| {
                     let apart = least - deviations[b][p];
                     let moved = deviations[a][p] + value.magnitude() * GROWN * deviations[b][p];
-                    (apart > 0.0).then(|| moved / apart)
+                    if apart > 0.0 { moved / apart } else { f64::INFINITY }
                 };
-                (value, [moved(0)?, moved(1)?])
+                (value, [moved(0), moved(1)])
             }
         })
     }
+}
+
+/// Nothing is known of ∞·0 either.
+fn no_number_is_infinite(x: f64) -> f64 {
+    if x.is_nan() { f64::INFINITY } else { x }
 }
 
 /// What an operation rounds whose operands are off.

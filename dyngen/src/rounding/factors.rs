@@ -30,6 +30,8 @@ pub(super) struct Factors {
     pub(super) lower_inverse: Vec<Interval>,
     /// D
     pub(super) pivots: Vec<Interval>,
+    /// The largest entries of B's diagonal, where the ranges are those of `bodies.rs`.
+    pub(super) diagonal: Option<Vec<f64>>,
 }
 
 /// B of an arm, over boxes of poses.
@@ -88,6 +90,55 @@ impl MassMatrix {
             }));
         }
         Some(found)
+    }
+
+    /// At least the largest entries of the diagonal; poses are halved where an entry's bound is largest, `boxes` times
+    /// for each. `None` where an angle is too large.
+    pub(super) fn largest_diagonal(&self, boxes: usize) -> Option<Vec<f64>> {
+        let mut gradient = Gradient::default();
+        let m = self.varied.len();
+        let mut largest = Vec::with_capacity(self.n);
+        for i in 0..self.n {
+            let Some((place, negative)) = self.entries[i * self.n + i] else { return None };
+            // The bound over a box, and the variable that adds most to it.
+            let mut bound = |ranges: &[Interval]| -> Option<(f64, Option<usize>)> {
+                gradient.evaluate(&self.code, ranges, &self.varied)?;
+                let slope = |which: usize| gradient.slopes[place * m + which].magnitude();
+                let adds = |which: &usize| ranges[self.varied[*which]].width() * slope(*which);
+                let widest = (0..m).max_by(|a, b| adds(a).total_cmp(&adds(b))).filter(|w| adds(w) > 0.0);
+                let value = gradient.values[place].negated(negative).high;
+                Some((value, widest.map(|which| self.varied[which])))
+            };
+            let mut parts = vec![(bound(&self.ranges)?, self.ranges.clone())];
+            for _ in 0..boxes {
+                let worst = (0..parts.len()).max_by(|a, b| parts[*a].0.0.total_cmp(&parts[*b].0.0))?;
+                let (_, Some(widest)) = parts[worst].0 else { break };
+                let (_, ranges) = parts.swap_remove(worst);
+                for half in ranges[widest].halves() {
+                    let mut ranges = ranges.clone();
+                    ranges[widest] = half;
+                    parts.push((bound(&ranges)?, ranges));
+                }
+            }
+            largest.push(parts.iter().map(|((value, _), _)| *value).fold(f64::NEG_INFINITY, f64::max));
+        }
+        Some(largest)
+    }
+
+    /// By how much the rounding of given parameters to either format moves each entry at most, row-major.
+    pub(super) fn moved_by_parameters(&self) -> Option<Vec<f64>> {
+        let mut gradient = Gradient::default();
+        let given: Vec<usize> = (0..self.code.variables.len())
+            .filter(|k| self.code.variables[*k].0 == Argument::Parameters)
+            .collect();
+        gradient.evaluate(&self.code, &self.ranges, &given)?;
+        let entry = |entry: &Option<(usize, bool)>| {
+            let Some((place, _)) = entry else { return 0.0 };
+            let slopes = &gradient.slopes[place * given.len()..(place + 1) * given.len()];
+            let moved = slopes.iter().zip(&given).map(|(x, k)| x.magnitude() * 0.5 * self.ranges[*k].width());
+            moved.sum::<f64>() * (1.0 + 1e-12)
+        };
+        Some(self.entries.iter().map(entry).collect())
     }
 
     /// How far B is from that of the centre over a box; `None` where B of the centre is not positive.
@@ -264,7 +315,8 @@ impl Factors {
     fn none(n: usize) -> Factors {
         let nothing = Interval { low: f64::INFINITY, high: f64::NEG_INFINITY };
         let matrix = || vec![nothing; n * n];
-        Factors { n, inverse: matrix(), lower: matrix(), lower_inverse: matrix(), pivots: vec![nothing; n] }
+        let (inverse, lower, lower_inverse) = (matrix(), matrix(), matrix());
+        Factors { n, inverse, lower, lower_inverse, pivots: vec![nothing; n], diagonal: None }
     }
 
     /// Widens the ranges by those of a box of poses with the factors of 1 + E within `off` of 1.

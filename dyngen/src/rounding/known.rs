@@ -4,6 +4,7 @@
 //! field it equals that of an entry of L, of B⁻¹, … (two that differ agree there with a chance below 2⁻⁵⁴, as in
 //! `prove/`). The same holds for derivatives of the result by each of the operations.
 
+use super::energy::{Exact, Solves};
 use super::factors::Factors;
 use super::interval::Interval;
 use super::program::Operation;
@@ -32,10 +33,21 @@ enum Fact {
     Sum(Rc<[Fp]>, Vec<f64>),
 }
 
+/// What is known of a program.
+#[derive(Clone, Debug)]
+pub(super) struct KnownProgram {
+    /// By operation.
+    pub(super) known: Vec<Option<Known>>,
+    /// Of arms whose links are known as bodies.
+    pub(super) solves: Option<Solves>,
+}
+
 /// All facts about a function, with the values of its operations.
-pub(super) struct Facts {
+pub(super) struct Facts<'a> {
     facts: FxHashMap<u64, Fact>,
     nodes: Vec<Option<Fp>>,
+    ranges: &'a Factors,
+    exact: Exact,
 }
 
 /// LᵀDL at the random point, and the ranges of its entries.
@@ -49,20 +61,26 @@ struct Solve<'a> {
     pivots: Vec<Fp>,
 }
 
-impl Facts {
+impl<'a> Facts<'a> {
     /// `None` where the point is none of the function's, which chance excludes.
-    pub(super) fn new(model: &Model, built: &FunctionGraph, ranges: &Factors) -> Option<Facts> {
+    pub(super) fn new(model: &Model, built: &FunctionGraph, ranges: &'a Factors) -> Option<Facts<'a>> {
         let set = model.set(SetKind::Minimal).ok()?;
         let mut draws = Draws::new(0x0073_6f6c_7665);
         let point = Point::draw(model.arm(), model.symbols(), model.sets(), &mut draws);
         let expected = |function| prove::expected(&point, set, function);
         let solve =
             Solve::new(expected(Function::MassMatrix), expected(Function::MassMatrixInverse), ranges)?;
-        let mut facts = Facts { facts: FxHashMap::default(), nodes: point.nodes(set, built)? };
+        let (b, lower, pivots) = (solve.b.clone(), solve.lower.clone(), solve.pivots.clone());
+        let exact = Exact { n: solve.n, b, lower, pivots, solutions: Vec::new() };
+        let mut facts = Facts { facts: FxHashMap::default(), nodes: point.nodes(set, built)?, ranges, exact };
         facts.of_factors(&solve);
         let n = solve.n;
         match built.function {
-            Function::MassMatrixInverse => facts.of_inverse(&solve),
+            Function::MassMatrixInverse => {
+                facts.of_inverse(&solve);
+                let column = |j: usize| (0..n).map(|i| solve.inverse[i * n + j]).collect();
+                facts.exact.solutions.extend((0..n).map(column));
+            }
             Function::ForwardDynamics => facts.of_solution(&solve, &expected(Function::ForwardDynamics)),
             Function::AccelerationByPosition | Function::AccelerationByVelocity => {
                 facts.of_solution(&solve, &expected(Function::ForwardDynamics));
@@ -136,6 +154,7 @@ impl Facts {
     /// What is computed on the way from r = B·x to x, and the derivatives of x by what is left of B.
     fn of_solution(&mut self, solve: &Solve<'_>, x: &[Fp]) {
         let (n, ranges) = (solve.n, solve.ranges);
+        self.exact.solutions.push(x.to_vec());
         let right: Rc<[Fp]> = product(&solve.b, x).into();
         let size = |o: usize, j: usize| ranges.inverse[o * n + j].magnitude();
         let of = |i: usize, factor: f64| -> Vec<f64> {
@@ -160,7 +179,7 @@ impl Facts {
     }
 
     /// For each operation what is known of it; `nodes` are those of the emitted ones, which stand first.
-    pub(super) fn of(&self, operations: &[Operation], nodes: &[usize]) -> Option<Vec<Option<Known>>> {
+    pub(super) fn of(&self, operations: &[Operation], nodes: &[usize]) -> Option<KnownProgram> {
         let mut values: Vec<Fp> = Vec::with_capacity(operations.len());
         for (k, operation) in operations.iter().enumerate() {
             values.push(match (nodes.get(k), operation) {
@@ -191,7 +210,9 @@ impl Facts {
             turned(self.facts.get(&value.residue()), false)
                 .or_else(|| turned(self.facts.get(&(-*value).residue()), true))
         };
-        Some(values.iter().enumerate().map(known).collect())
+        let emitted = nodes.len();
+        let solves = Solves::new(&self.exact, self.ranges, &operations[..emitted], &values[..emitted]);
+        Some(KnownProgram { known: values.iter().enumerate().map(known).collect(), solves })
     }
 }
 

@@ -11,7 +11,9 @@
 //! et al. (FPTaylor, 2015).
 
 mod angle;
+mod bodies;
 mod deviation;
+mod energy;
 mod factors;
 mod gradient;
 mod interval;
@@ -64,13 +66,22 @@ pub fn bounds(model: &Model, built: &FunctionGraph, parameters: Option<&[f64]>) 
 pub struct Bounder<'a> {
     model: &'a Model,
     parameters: Option<&'a [f64]>,
+    /// Values of the full set.
+    links: Option<&'a [f64]>,
     factors: OnceLock<Result<Factors, String>>,
 }
 
 impl<'a> Bounder<'a> {
     /// For values of the minimal set, as [`bounds`].
     pub fn new(model: &'a Model, parameters: Option<&'a [f64]>) -> Self {
-        Bounder { model, parameters, factors: OnceLock::new() }
+        Bounder { model, parameters, links: None, factors: OnceLock::new() }
+    }
+
+    /// With the same values in the full set: each link is then known as a body, and more arms have bounds of functions
+    /// that divide by pivots of B.
+    #[must_use]
+    pub fn with_links(self, values: Option<&'a [f64]>) -> Self {
+        Bounder { links: values, ..self }
     }
 
     /// As [`bounds`].
@@ -109,7 +120,7 @@ impl<'a> Bounder<'a> {
     }
 
     /// What is known of a function that divides by pivots of B.
-    fn facts(&self, built: &FunctionGraph, limits: &Limits<'_>) -> Result<Facts, String> {
+    fn facts(&self, built: &FunctionGraph, limits: &Limits<'_>) -> Result<Facts<'_>, String> {
         let set = self.model.set(SetKind::Minimal).map_err(|e| e.to_string())?;
         if built.parameters != set.parameters.len() {
             return Err("B is proven positive for the minimal set alone".to_string());
@@ -122,7 +133,11 @@ impl<'a> Bounder<'a> {
         let Bounder { model, parameters: Some(values), .. } = *self else { return Err(ANY.to_string()) };
         let built = model.function(Function::MassMatrix, SetKind::Minimal).map_err(|e| e.to_string())?;
         let mass = MassMatrix::new(model, &built, limits).ok_or("a parameter has no value")?;
-        let Some(rough) = mass.factors(ROUGH, BOXES) else {
+        let of_bodies = || {
+            let set = model.set(SetKind::Full).ok()?;
+            bodies::factors(model.arm(), set, self.links?, &mass)
+        };
+        let Some(rough) = mass.factors(ROUGH, BOXES).or_else(of_bodies) else {
             return Err(match self.worst(Function::MassMatrix, values) {
                 Ok((smallest, pose)) if smallest <= 0.0 => format!(
                     "B(q) is not positive definite with these values: its smallest eigenvalue is {smallest:.2e} at q = \

@@ -2,7 +2,7 @@
 
 use super::angle::Angle;
 use super::interval::Interval;
-use super::known::{Facts, Known};
+use super::known::{Facts, KnownProgram};
 use super::norms::{self, Norm};
 use super::precision::{PRECISIONS, Precision};
 use super::slopes;
@@ -108,7 +108,7 @@ pub(super) struct Program {
     /// Better bounds for some operations.
     pub(super) norms: Vec<Option<Norm>>,
     /// What is known of some where B is divided by.
-    known: Option<Vec<Option<Known>>>,
+    known: Option<KnownProgram>,
     pub(super) angles: Vec<(JointSum, Angle)>,
     /// What it reads.
     pub(super) variables: Vec<Variable>,
@@ -129,7 +129,7 @@ impl Program {
         model: &Model,
         built: &FunctionGraph,
         output: usize,
-        facts: Option<&Facts>,
+        facts: Option<&Facts<'_>>,
     ) -> Option<Program> {
         let Emitted { mut operations, nodes, angles, variables } =
             Emitted::new(model, built, &built.outputs[output..=output])?;

@@ -1,0 +1,171 @@
+//! Ranges of LᵀDL and of B⁻¹ from the links' bodies alone, for every pose: where boxes of poses prove nothing, since the
+//! last links are light.
+//!
+//! Twice the kinetic energy, q̇ᵀBq̇, is at least that of any of the links, where each is a body.
+//!
+//! * A pivot dᵢ is q̇ᵀBq̇ at its smallest with q̇ᵢ = 1 and the joints before at rest (Featherstone, *Rigid Body
+//!   Dynamics Algorithms* (2008), §7.3: the articulated inertia about the joint). The link alone has its inertia about the
+//!   axis, and dᵢ ≤ Bᵢᵢ.
+//! * (B⁻¹)ᵢᵢ is the largest q̇ᵢ² with q̇ᵀBq̇ = 1. A joint's velocity is the difference of those of two links about its
+//!   axis z, and ω of a body with inertia I about its centre has (z·ω)² ≤ zᵀI⁻¹z times ωᵀIω. The sum of both links'
+//!   zᵀI⁻¹z is bᵢ ≥ (B⁻¹)ᵢᵢ.
+//! * Everything else by the inequality of Cauchy and Schwarz: |(B⁻¹)ᵢⱼ|² ≤ bᵢbⱼ, |Lₖⱼ|² ≤ Bⱼⱼ/dₖ, and column k of L⁻¹ is
+//!   how joints without torque move if joint k does with 1: twice the energy is dₖ, so |L⁻¹ⱼₖ|² ≤ bⱼdₖ.
+
+use super::factors::{Factors, MassMatrix};
+use super::interval::Interval;
+use crate::arm::{Arm, Convention, Joint, JointKind, ParameterKind};
+use crate::consistency::pseudo_inertia;
+use crate::exact::rational::to_f64;
+use crate::parameters::ParameterSet;
+use nalgebra::{Matrix3, Vector3};
+
+/// A link as a body.
+struct Body {
+    mass: f64,
+    /// Its centre in the link's frame.
+    centre: Vector3<f64>,
+    /// Inverse of its inertia about the centre.
+    of_inertia: Matrix3<f64>,
+    /// Inertia about the frame's origin.
+    about_origin: Matrix3<f64>,
+    moment: Vector3<f64>,
+}
+
+/// A joint's axis in a link's frame: its direction, and a point that it goes through.
+struct Axis {
+    z: Vector3<f64>,
+    point: Vector3<f64>,
+}
+
+/// The ranges for `values` of the full set; `None` where a link is no body with mass and volume, or the energy is more than
+/// that of the links: rotors, joints that follow others.
+pub(super) fn factors(arm: &Arm, set: &ParameterSet, values: &[f64], mass: &MassMatrix) -> Option<Factors> {
+    let most = mass.largest_diagonal(HALVINGS)?;
+    let n = most.len();
+    if arm.joints.len() != n || arm.joints.iter().any(|joint| joint.rotor_ratio.is_some()) {
+        return None;
+    }
+    let bodies: Option<Vec<Body>> = (0..n).map(|link| Body::of(arm, set, values, link)).collect();
+    let bodies = bodies?;
+    let (mut least, mut velocity) = (vec![0.0; n], vec![0.0; n]);
+    for (i, joint) in arm.joints.iter().enumerate() {
+        let [before, own] = axis(arm.convention, joint);
+        least[i] = bodies[i].along(joint.kind, &own);
+        velocity[i] = match i.checked_sub(1) {
+            None => 1.0 / least[i],
+            Some(k) => bodies[i].mobility(joint.kind, &own) + bodies[k].mobility(joint.kind, &before),
+        };
+    }
+    // The emitted code has the parameters of its set, rounded: a B' with |xᵀ(B' − B)x| ≤ share·xᵀBx.
+    let moved = mass.moved_by_parameters()?;
+    let entry = |at: usize| (velocity[at / n] * velocity[at % n]).sqrt() * moved[at];
+    let share = (0..n * n).map(entry).sum::<f64>() * ROUNDED;
+    if share.is_nan() || share >= MOVED {
+        return None;
+    }
+    least.iter_mut().for_each(|x| *x *= 1.0 - share);
+    velocity.iter_mut().for_each(|x| *x /= 1.0 - share);
+    let is_size = |x: &f64| x.is_finite() && *x > 0.0;
+    if ![&least, &velocity, &most].iter().all(|all| all.iter().all(is_size)) {
+        return None;
+    }
+    let root = |x: f64| Interval::within(x.sqrt() * ROUNDED);
+    let mut found = Factors {
+        n,
+        inverse: vec![Interval::point(0.0); n * n],
+        lower: vec![Interval::point(0.0); n * n],
+        lower_inverse: vec![Interval::point(0.0); n * n],
+        pivots: (0..n).map(|i| Interval { low: least[i] / ROUNDED, high: most[i] * ROUNDED }).collect(),
+        diagonal: Some(most.iter().map(|x| x * ROUNDED).collect()),
+    };
+    for i in 0..n {
+        for j in 0..n {
+            let at = i * n + j;
+            found.inverse[at] = root(velocity[i] * velocity[j]);
+            if j < i {
+                found.lower[at] = root(most[j] / least[i]);
+                found.lower_inverse[at] = root(velocity[i] * most[j]);
+            }
+        }
+        let at = i * n + i;
+        found.inverse[at].low = 1.0 / (most[i] * ROUNDED);
+        (found.lower[at], found.lower_inverse[at]) = (Interval::point(1.0), Interval::point(1.0));
+    }
+    Some(found)
+}
+
+/// Halvings of the poses for each entry of B's diagonal.
+const HALVINGS: usize = 400;
+
+/// The share of B by which rounded parameters may move it.
+const MOVED: f64 = 0.5;
+
+/// More than what these sums and products of doubles round.
+const ROUNDED: f64 = 1.0 + 1e-9;
+
+/// Of the smallest eigenvalue of a pseudo-inertia, relative to the largest: below that a body has no volume.
+const THIN: f64 = 1e-9;
+
+impl Body {
+    fn of(arm: &Arm, set: &ParameterSet, values: &[f64], link: usize) -> Option<Body> {
+        let given = |kind: &ParameterKind| -> f64 {
+            let own = |p: &crate::parameters::SetParameter| matches!(&p.terms[..], [(q, _)] if q.link == link && q.kind == *kind);
+            set.parameters.iter().position(own).and_then(|k| values.get(k)).copied().unwrap_or(0.0)
+        };
+        let v: [f64; 10] = std::array::from_fn(|k| given(&ParameterKind::ALL[k]));
+        let eigenvalues = pseudo_inertia(&v).symmetric_eigenvalues();
+        if eigenvalues.min() <= THIN * eigenvalues.max() || arm.joints.get(link).is_none() {
+            return None;
+        }
+        let [mass, mx, my, mz, xx, xy, xz, yy, yz, zz] = v;
+        let moment = Vector3::new(mx, my, mz);
+        let centre = moment / mass;
+        let about_origin = Matrix3::new(xx, -xy, -xz, -xy, yy, -yz, -xz, -yz, zz);
+        let shift = centre.cross_matrix();
+        let inertia = about_origin + shift * shift * mass;
+        let of_inertia = inertia.try_inverse()?;
+        Some(Body { mass, centre, of_inertia, about_origin, moment })
+    }
+
+    /// Twice the energy where it moves with 1 about or along an axis alone.
+    fn along(&self, kind: JointKind, axis: &Axis) -> f64 {
+        match kind {
+            JointKind::Prismatic => self.mass,
+            JointKind::Revolute => {
+                // About the origin it is zᵀIz; the axis goes through another point p: v = z × (r − p).
+                let arm = axis.z.cross(&axis.point);
+                let moved = self.about_origin * axis.z;
+                axis.z.dot(&moved) - 2.0 * arm.dot(&axis.z.cross(&self.moment))
+                    + self.mass * arm.norm_squared()
+            }
+        }
+    }
+
+    /// The largest square of its velocity about or along an axis where twice its energy is 1.
+    fn mobility(&self, kind: JointKind, axis: &Axis) -> f64 {
+        let about = |v: &Vector3<f64>| v.dot(&(self.of_inertia * v));
+        match kind {
+            JointKind::Revolute => about(&axis.z),
+            JointKind::Prismatic => 1.0 / self.mass + about(&(axis.point - self.centre).cross(&axis.z)),
+        }
+    }
+}
+
+/// A joint's axis in the frame of the link before it, and in that of its own.
+fn axis(convention: Convention, joint: &Joint) -> [Axis; 2] {
+    let (s, c) = joint.alpha.radians().sin_cos();
+    let [a, b, d] = [&joint.a, &joint.b, &joint.d].map(to_f64);
+    let z = Vector3::z();
+    match convention {
+        Convention::Standard => {
+            // T = Rz(θ)·(a, b, d)·Rx(α): z of the frame before, seen from the far end.
+            let point = -Vector3::new(a, c * b + s * d, c * d - s * b);
+            [Axis { z, point: Vector3::zeros() }, Axis { z: Vector3::new(0.0, s, c), point }]
+        }
+        Convention::Modified => {
+            let before = Axis { z: Vector3::new(0.0, -s, c), point: Vector3::new(a, b, 0.0) };
+            [before, Axis { z, point: Vector3::zeros() }]
+        }
+    }
+}

@@ -1,0 +1,413 @@
+//! What a solve with LᵀDL may be off, in the norm of the kinetic energy: where a forward bound grows from joint to joint.
+//!
+//! Backward analysis (Higham, *Accuracy and Stability of Numerical Algorithms* (2002), §8.1 and §10.1). The computed
+//! factors are the exact ones of B + ΔB, with ΔBᵢⱼ what the sum for an entry rounds. With bᵢ ≥ (B⁻¹)ᵢᵢ, xᵢ² ≤ bᵢ·xᵀBx, so
+//! |xᵀΔB·x| ≤ η·xᵀBx with η = Σ √(bᵢbⱼ)·|ΔBᵢⱼ|: K(B + ΔB)Kᵀ = 1 + E with |Eᵢⱼ| ≤ η, and the factors of 1 + E are 1 within
+//! N = η/(1 − nη), as in `factors.rs`. The solves add residuals: e of Lᵀy = r + e counts √bᵢ·eᵢ, one of L·x = z counts
+//! √dᵢ·eᵢ; ρ is their sum, and R = Σ √bⱼ·|rⱼ| ≥ √(xᵀBx).
+//!
+//! An operation is taken for one of a solve where it has that one's value at a random point of the prime field, and where
+//! it keeps the equation of the solve when factors and results before it are replaced by random numbers.
+
+use super::factors::Factors;
+use super::interval::Interval;
+use super::precision::PRECISIONS;
+use super::program::{Errors, Operation};
+use crate::exact::prime::{Draws, Fp};
+use rustc_hash::FxHashMap;
+
+/// What an operation is in a solve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Role {
+    Pivot(usize),
+    /// 1/d
+    OfPivot(usize),
+    /// dₖ·Lₖⱼ, before it is divided.
+    Scaled(usize, usize),
+    Lower(usize, usize),
+    /// An entry of y of a solve.
+    Right(usize, usize),
+    /// y·(1/d)
+    Half(usize, usize),
+    Solution(usize, usize),
+}
+
+/// The values of a factorisation and of its solves at a random point of the prime field.
+#[derive(Clone, Debug)]
+pub(super) struct Exact {
+    pub(super) n: usize,
+    pub(super) b: Vec<Fp>,
+    pub(super) lower: Vec<Fp>,
+    pub(super) pivots: Vec<Fp>,
+    /// x of each solve.
+    pub(super) solutions: Vec<Vec<Fp>>,
+}
+
+/// The solves of a program.
+#[derive(Clone, Debug)]
+pub(super) struct Solves {
+    /// By emitted operation.
+    roles: Vec<Option<Role>>,
+    /// By solve and entry the operation that is its right-hand side; none where that is zero.
+    rights: Vec<Vec<Option<usize>>>,
+    /// By emitted operation whether it is a right-hand side.
+    is_right: Vec<bool>,
+    pivots: Vec<Interval>,
+    /// Largest entries of B's diagonal.
+    diagonal: Vec<f64>,
+    /// √bᵢ
+    mobility: Vec<f64>,
+}
+
+/// Sums over the operations so far.
+#[derive(Clone, Debug)]
+pub(super) struct Running {
+    eta: Errors,
+    rho: Vec<Errors>,
+    /// What each operation is off if factors and results of solves are taken as they were computed.
+    local: Vec<Errors>,
+}
+
+impl Solves {
+    /// `values` are those of the emitted operations at the random point; `None` where the ranges are not those of bodies.
+    pub(super) fn new(
+        exact: &Exact,
+        ranges: &Factors,
+        operations: &[Operation],
+        values: &[Fp],
+    ) -> Option<Solves> {
+        let (diagonal, n) = (ranges.diagonal.clone()?, exact.n);
+        let mut found = Recognised::new(exact, operations, values);
+        found.replace(&[]);
+        let rights: Vec<Vec<Option<usize>>> = (0..exact.solutions.len()).map(|s| found.solve(s)).collect();
+        let mut is_right = vec![false; operations.len()];
+        rights.iter().flatten().flatten().for_each(|r| is_right[*r] = true);
+        Some(Solves {
+            roles: found.roles,
+            rights,
+            is_right,
+            pivots: ranges.pivots.clone(),
+            diagonal,
+            mobility: (0..n).map(|i| ranges.inverse[i * n + i].high.sqrt()).collect(),
+        })
+    }
+
+    pub(super) fn start(&self) -> Running {
+        Running { eta: [0.0; 2], rho: vec![[0.0; 2]; self.rights.len()], local: Vec::new() }
+    }
+
+    /// Takes the next operation in: the range of its exact value, a forward bound of how far it is off, and what it rounds
+    /// by itself. `values` and `deviations` are those of the operations before. Returns range and bound with what
+    /// is known of solves.
+    pub(super) fn take(
+        &self,
+        running: &mut Running,
+        operation: Operation,
+        (value, deviation, rounds): (Interval, Errors, Errors),
+        (values, deviations): (&[Interval], &[Errors]),
+    ) -> (Interval, Errors) {
+        let k = running.local.len();
+        let local = [0, 1].map(|p| match self.is_right.get(k) {
+            Some(true) => deviation[p],
+            _ => local(operation, p, &running.local, rounds[p], (values, deviations)),
+        });
+        let Some(role) = self.roles.get(k).copied().flatten() else {
+            running.local.push(local);
+            return (value, deviation);
+        };
+        running.local.push([0.0; 2]);
+        let energy = |s: usize| -> f64 {
+            let size = |r: usize| values.get(r).copied().unwrap_or(value).magnitude();
+            let entry = |(j, r): (usize, &Option<usize>)| r.map_or(0.0, size) * self.mobility[j];
+            self.rights[s].iter().enumerate().map(entry).sum::<f64>() * GROWN
+        };
+        let most = match role {
+            Role::Right(s, i) => self.pivots[i].high.sqrt() * energy(s),
+            Role::Half(s, i) => energy(s) / self.pivots[i].low.sqrt(),
+            Role::Solution(s, i) => self.mobility[i] * energy(s),
+            _ => f64::INFINITY,
+        };
+        let energy = match role {
+            Role::Right(s, _) | Role::Half(s, _) | Role::Solution(s, _) => energy(s),
+            _ => 0.0,
+        };
+        let bound = |p: usize| {
+            // Of the last row nothing was added before.
+            let operands = match operation {
+                Operation::Mul(a, b) => running.local[a][p] + running.local[b][p],
+                Operation::Div(_, b) => running.local[b][p],
+                _ => 0.0,
+            };
+            self.add(running, role, [local[p], operands], p);
+            deviation[p].min(infinite(self.bound(running, role, energy, p)))
+        };
+        let bounds = [0, 1].map(bound);
+        (if most.is_finite() { value.clamped(most * GROWN) } else { value }, bounds)
+    }
+
+    /// What an operation adds to η or ρ.
+    fn add(&self, running: &mut Running, role: Role, [local, operands]: Errors, p: usize) {
+        let b = &self.mobility;
+        match role {
+            Role::Pivot(i) => running.eta[p] += b[i] * b[i] * local,
+            Role::Scaled(k, j) => running.eta[p] += 2.0 * b[k] * b[j] * local,
+            Role::Lower(k, j) => {
+                running.eta[p] += 2.0 * b[k] * b[j] * (operands + divided(p) * self.scaled(k, j));
+            }
+            Role::OfPivot(i) => running.eta[p] += b[i] * b[i] * operands,
+            Role::Right(s, i) => running.rho[s][p] += b[i] * local,
+            Role::Solution(s, i) => running.rho[s][p] += self.pivots[i].high.sqrt() * local,
+            Role::Half(..) => {}
+        }
+    }
+
+    /// How far an operation is off by what η and ρ are so far; `energy` is R of its solve.
+    fn bound(&self, running: &Running, role: Role, energy: f64, p: usize) -> f64 {
+        let n = self.pivots.len() as f64;
+        let eta = running.eta[p] * GROWN;
+        if n * eta >= MOST {
+            return f64::INFINITY;
+        }
+        let near = eta / (1.0 - n * eta);
+        // Each quotient of a solve rounds too.
+        let rho = |s: usize| running.rho[s][p] * GROWN + n * divided(p) * energy;
+        match role {
+            Role::Pivot(i) => near * self.pivots[i].high,
+            Role::OfPivot(i) => (near / (1.0 - near) + divided(p)) / self.pivots[i].low,
+            Role::Lower(k, j) => near * (n * self.diagonal[j] / self.pivots[k].low).sqrt(),
+            Role::Scaled(k, j) => {
+                ((1.0 + near) * (1.0 + near * n.sqrt()) - 1.0 + 2.0 * divided(p)) * self.scaled(k, j)
+            }
+            Role::Right(s, i) => self.pivots[i].high.sqrt() * (n * near * (energy + rho(s)) + rho(s)),
+            Role::Half(s, i) => {
+                let quotients = (2.0 * near + divided(p)) * (1.0 + n * near) * (energy + rho(s));
+                (n * near * (energy + rho(s)) + rho(s) + quotients) / self.pivots[i].low.sqrt()
+            }
+            Role::Solution(s, i) => self.mobility[i] * (eta * energy + rho(s)) * (1.0 + eta) / (1.0 - eta),
+        }
+    }
+
+    /// The largest dₖ·Lₖⱼ.
+    fn scaled(&self, k: usize, j: usize) -> f64 {
+        (self.diagonal[j] * self.pivots[k].high).sqrt()
+    }
+}
+
+/// What an operation is off if those in `before` are taken as off by that alone.
+fn local(
+    operation: Operation,
+    p: usize,
+    before: &[Errors],
+    rounds: f64,
+    (values, deviations): (&[Interval], &[Errors]),
+) -> f64 {
+    let size = |a: usize| values[a].magnitude() + deviations[a][p];
+    let own = |a: usize| before[a][p];
+    let moved = match operation {
+        Operation::Add(a, b, _) => own(a) + own(b),
+        Operation::Mul(a, b) => size(a) * own(b) + size(b) * own(a) + own(a) * own(b),
+        Operation::Div(a, b) => {
+            let least = values[b].low.abs().min(values[b].high.abs()) - deviations[b][p];
+            let apart = least - own(b);
+            let moved = own(a) + (size(a) / least) * own(b);
+            if least > 0.0 && apart > 0.0 { moved / apart } else { f64::INFINITY }
+        }
+        _ => 0.0,
+    };
+    infinite((moved + rounds) * GROWN)
+}
+
+/// More than a product with a rounded reciprocal is off, as a share of itself.
+fn divided(p: usize) -> f64 {
+    3.0 * PRECISIONS[p].half_ulp(1.0)
+}
+
+/// n·η for which N is a bound worth having.
+const MOST: f64 = 0.5;
+/// For bounds of some roundings of doubles.
+const GROWN: f64 = 1.0 + 1e-9;
+
+/// Nothing is known of ∞·0.
+fn infinite(x: f64) -> f64 {
+    if x.is_nan() { f64::INFINITY } else { x }
+}
+
+/// What stands for a value.
+struct Stand {
+    /// `None` for a right-hand side alone.
+    role: Option<Role>,
+    /// What its operands must give; `None` for a right-hand side, however it is computed.
+    side: Option<Fp>,
+    number: Fp,
+}
+
+/// Operations with their roles, and the random numbers that stand for those.
+struct Recognised<'a> {
+    exact: &'a Exact,
+    operations: &'a [Operation],
+    values: &'a [Fp],
+    roles: Vec<Option<Role>>,
+    of_role: FxHashMap<Role, usize>,
+    /// By value.
+    factors: FxHashMap<u64, Stand>,
+    /// L and D of random numbers.
+    lower: Vec<Fp>,
+    pivots: Vec<Fp>,
+    draws: Draws,
+}
+
+impl<'a> Recognised<'a> {
+    fn new(exact: &'a Exact, operations: &'a [Operation], values: &'a [Fp]) -> Self {
+        let mut draws = Draws::new(0x656e_6572_6779);
+        let n = exact.n;
+        let lower: Vec<Fp> = (0..n * n).map(|_| draws.element()).collect();
+        let mut pivots: Vec<Fp> = (0..n).map(|_| draws.element()).collect();
+        let mut factors = FxHashMap::default();
+        let inverse = |x: Fp| x.inverse().unwrap_or(Fp::ZERO);
+        let mut scaled: Vec<Fp> = (0..n * n).map(|_| draws.element()).collect();
+        // The last row is that of B, whose entries may be parts of others: nothing stands for them.
+        let last = n - 1;
+        pivots[last] = exact.pivots[last];
+        (0..last).for_each(|j| scaled[last * n + j] = exact.b[last * n + j]);
+        for i in (0..n).rev() {
+            scaled[i * n + i] = pivots[i];
+            let eliminated = |j: usize| {
+                let term = |k: usize| lower[k * n + i] * scaled[k * n + j];
+                (i + 1..n).fold(exact.b[i * n + j], |sum, k| sum - term(k))
+            };
+            let (d, of_pivot) = (exact.pivots[i], inverse(pivots[i]));
+            if i < last {
+                stand(&mut factors, d, Some(Role::Pivot(i)), Some(eliminated(i)), pivots[i]);
+            }
+            stand(&mut factors, inverse(d), Some(Role::OfPivot(i)), Some(of_pivot), of_pivot);
+            for j in 0..i {
+                let (l, s) = (exact.lower[i * n + j], scaled[i * n + j]);
+                if i < last {
+                    stand(&mut factors, l * d, Some(Role::Scaled(i, j)), Some(eliminated(j)), s);
+                }
+                stand(&mut factors, l, Some(Role::Lower(i, j)), Some(s * of_pivot), lower[i * n + j]);
+            }
+        }
+        let (roles, of_role) = (vec![None; operations.len()], FxHashMap::default());
+        Recognised { exact, operations, values, roles, of_role, factors, lower, pivots, draws }
+    }
+
+    /// Evaluates all operations with the numbers in the place of those that they stand for, and gives these their roles;
+    /// `more` goes behind the factors.
+    fn replace(&mut self, more: &[FxHashMap<u64, Stand>]) {
+        let mut replaced: Vec<Fp> = Vec::with_capacity(self.values.len());
+        for (k, operation) in self.operations.iter().enumerate() {
+            let value = self.values[k];
+            let by_operands = match *operation {
+                Operation::Add(a, b, true) => replaced[a] - replaced[b],
+                Operation::Add(a, b, false) => replaced[a] + replaced[b],
+                Operation::Mul(a, b) => replaced[a] * replaced[b],
+                Operation::Div(a, b) => replaced[b].inverse().map_or(value, |x| replaced[a] * x),
+                _ => value,
+            };
+            let mut maps = std::iter::once(&self.factors).chain(more);
+            let found = maps.find_map(|map| {
+                let plus = map.get(&value.residue()).map(|stand| (stand, false));
+                plus.or_else(|| Some((map.get(&(-value).residue())?, true)))
+            });
+            let turned = |x: Fp, negative: bool| if negative { -x } else { x };
+            let (mut number, mut own) = (by_operands, None);
+            if let Some((stand, negative)) = found {
+                let holds = stand.side.is_none_or(|side| by_operands == turned(side, negative));
+                let free = |role: Role| {
+                    let first = self.of_role.get(&role).is_none_or(|at| *at == k);
+                    first && self.may_be(k, *operation, role)
+                };
+                if holds && stand.role.is_none_or(free) {
+                    (number, own) = (turned(stand.number, negative), stand.role);
+                }
+            }
+            if let Some(role) = own
+                && self.roles[k].is_none()
+            {
+                self.roles[k] = Some(role);
+                self.of_role.insert(role, k);
+            }
+            replaced.push(number);
+        }
+    }
+
+    /// A quotient is one where it is the rounded product with a rounded reciprocal.
+    fn may_be(&self, k: usize, operation: Operation, role: Role) -> bool {
+        let of = |a: usize| self.roles[a];
+        match (role, operation) {
+            (Role::OfPivot(_), Operation::Div(one, _)) => self.values[one] == Fp::ONE,
+            (Role::Lower(i, _) | Role::Half(_, i), Operation::Mul(a, b)) => {
+                of(a) == Some(Role::OfPivot(i)) || of(b) == Some(Role::OfPivot(i))
+            }
+            (Role::OfPivot(_) | Role::Lower(..) | Role::Half(..), _) => false,
+            // What is given, or the same number of another role, is computed from nothing.
+            _ => self.roles[k].is_none_or(|known| known == role),
+        }
+    }
+
+    /// Gives the operations of a solve their roles; returns the right-hand side.
+    fn solve(&mut self, s: usize) -> Vec<Option<usize>> {
+        let Exact { n, b, lower, pivots, solutions } = self.exact;
+        let n = *n;
+        let x = &solutions[s];
+        let sum = |of: &dyn Fn(usize) -> Fp, range: std::ops::Range<usize>| {
+            range.fold(Fp::ZERO, |sum, j| sum + of(j))
+        };
+        let right: Vec<Fp> = (0..n).map(|i| sum(&|j| b[i * n + j] * x[j], 0..n)).collect();
+        let half: Vec<Fp> = (0..n).map(|i| sum(&|j| lower[i * n + j] * x[j], 0..i + 1)).collect();
+        let mut map = FxHashMap::default();
+        // What stands for y, z and x.
+        let mut numbers = [vec![Fp::ZERO; n], vec![Fp::ZERO; n], vec![Fp::ZERO; n]];
+        for i in (0..n).rev() {
+            let term = |k: usize| self.lower[k * n + i] * numbers[0][k];
+            let side = right[i] - sum(&term, i + 1..n);
+            numbers[0][i] = self.number(half[i] * pivots[i], side);
+            let (role, side) = (Some(Role::Right(s, i)), (i + 1 < n).then_some(side));
+            stand(&mut map, half[i] * pivots[i], role, side, numbers[0][i]);
+        }
+        for i in 0..n {
+            let side = numbers[0][i] * self.pivots[i].inverse().unwrap_or(Fp::ZERO);
+            numbers[1][i] = side;
+            stand(&mut map, half[i], Some(Role::Half(s, i)), Some(side), side);
+        }
+        for i in 0..n {
+            let term = |k: usize| self.lower[i * n + k] * numbers[2][k];
+            let side = numbers[1][i] - sum(&term, 0..i);
+            numbers[2][i] = if x[i] == half[i] { side } else { self.number(x[i], side) };
+            stand(&mut map, x[i], Some(Role::Solution(s, i)), Some(side), numbers[2][i]);
+        }
+        // However they are computed.
+        let mut given = FxHashMap::default();
+        for r in &right[..n - 1] {
+            stand(&mut given, *r, None, None, *r);
+        }
+        self.replace(&[map, given]);
+        let place = |r: &Fp| {
+            let same = |v: &Fp| *r != Fp::ZERO && (*v == *r || -*v == *r);
+            self.values.iter().position(same)
+        };
+        right.iter().map(place).collect()
+    }
+
+    /// What stands for a result: the number of a factor of the same value, or a random one.
+    fn number(&mut self, value: Fp, side: Fp) -> Fp {
+        if value == Fp::ZERO {
+            return Fp::ZERO;
+        }
+        let of = |v: Fp| self.factors.get(&v.residue()).map(|stand| stand.number);
+        let known = of(value).or_else(|| of(-value).map(|x| -x));
+        match known {
+            Some(number) if number == side => number,
+            // What is given.
+            _ if value == side => value,
+            _ => self.draws.element(),
+        }
+    }
+}
+
+fn stand(map: &mut FxHashMap<u64, Stand>, value: Fp, role: Option<Role>, side: Option<Fp>, number: Fp) {
+    if value != Fp::ZERO {
+        map.entry(value.residue()).or_insert(Stand { role, side, number });
+    }
+}
