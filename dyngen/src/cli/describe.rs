@@ -24,6 +24,9 @@ pub(super) struct Args {
     /// Parameter values, JSON, for which rounding is bounded; without them each parameter is within ±1 SI unit.
     #[arg(long, value_name = "FILE.json")]
     values: Option<PathBuf>,
+    /// Bound the rounding of code that is generated with --contract.
+    #[arg(long)]
+    contract: bool,
     /// One JSON object on standard output.
     #[arg(long)]
     json: bool,
@@ -40,8 +43,9 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         None => None,
     };
     let progress = Progress::new(model.arm());
-    let description = Description::with_progress(&model, values.as_deref(), |what| progress.say(what))
-        .map_err(Failure::refused)?;
+    let description =
+        Description::with_progress(&model, values.as_deref(), args.contract, |what| progress.say(what));
+    let description = description.map_err(Failure::refused)?;
     drop(progress);
     let digits = if args.exact { Digits::All } else { Digits::Six };
     let text = match args.json {
@@ -234,7 +238,8 @@ fn rounding_table(t: &mut String, arm: &Arm, rounding: &Rounding) {
     let _ = writeln!(
         t,
         "\nrounding: |emitted − exact| of each function's worst entry, in its unit, for every state within the \
-         limits\n(parameters: {}):",
+         limits\n({}parameters: {}):",
+        if rounding.contracted { "code with --contract; " } else { "" },
         rounding.parameters.text()
     );
     let _ = writeln!(t, "  {:<36} {:>8} {:>8}  decimals that hold in f32, f64", "function", "f32", "f64");

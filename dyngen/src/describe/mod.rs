@@ -9,7 +9,7 @@ pub use weak::Weak;
 use crate::arm::{Arm, Joint, Transmission};
 use crate::base::sets::{Class, combination_text};
 use crate::base::symmetry::{self, Removed, Symmetry};
-use crate::dynamics::Function;
+use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::rational;
 use crate::graph::{Operations, Preparation};
 use crate::model::{Error, Model};
@@ -39,27 +39,28 @@ impl Description {
     /// # Errors
     /// As [`Model::function`].
     pub fn of(model: &Model) -> Result<Description, Error> {
-        Description::with_progress(model, None, |_| {})
+        Description::with_progress(model, None, false, |_| {})
     }
 
     /// As [`Self::of`], with progress reported; with bounds of rounding for these `values` of the
-    /// minimal set, where there are any.
+    /// minimal set, where there are any, and of code that forms products within sums if it is `contracted`.
     ///
     /// # Errors
     /// As [`Model::function`].
     pub fn with_progress(
         model: &Model,
         values: Option<&[f64]>,
+        contracted: bool,
         say: impl Fn(&str),
     ) -> Result<Description, Error> {
         let mut preparation = Preparation::default();
         let mut operations = Vec::new();
-        let mut rounding = Rounding::of(model.arm(), values);
+        let mut rounding = Rounding::of(model.arm(), values, contracted);
         let functions: Vec<Function> = model.functions(SetKind::Minimal).collect();
         let bounded = rounding.is_some();
         let bounder = Bounder::new(model, values);
         let of = |function: Function| {
-            let built = model.function(function, SetKind::Minimal)?;
+            let built = FunctionGraph { contracted, ..model.function(function, SetKind::Minimal)? };
             let bounds = bounded.then(|| bounder.bounds(&built));
             Ok::<_, Error>((built, bounds))
         };
@@ -117,6 +118,9 @@ impl Description {
         });
         if let Some(rounding) = &self.rounding {
             object["rounding"] = rounding.json();
+            if rounding.contracted {
+                object["contract"] = json!(true);
+            }
             object["rounding_parameters"] = json!(rounding.parameters.text());
         }
         object

@@ -1,11 +1,18 @@
 //! Which sums take a product into their own operation: a·b + c, rounded once (a fused multiply-add, IEEE 754 §5.4.1).
 
-use super::{Expr, Graph, Node, operands};
+use super::{Expr, Graph, Holds, Node, operands};
+use std::cmp::Reverse;
+
+/// Cycles after which a result is there, of the processor where sums are fastest next to the others (Zen 5).
+const FUSED: usize = 4;
+const PRODUCT: usize = 3;
+const SUM: usize = 2;
+const QUOTIENT: usize = 13;
 
 /// The products that are formed within sums. Code that is printed, and bounds of its rounding, read it from here.
 ///
-/// It depends on the order of the nodes that hold the state and on their depth alone, so it is the same for a function
-/// before and after what depends on the parameters alone is taken out; of that nothing is contracted.
+/// It depends on the nodes that hold the state alone and on their order, so it is the same for a function before and after
+/// what depends on the parameters alone is taken out; of that nothing is contracted.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Contraction {
     /// Of each node that is a sum, the product that it takes in.
@@ -21,31 +28,26 @@ impl Contraction {
         Contraction { product: vec![None; nodes], within: vec![false; nodes] }
     }
 
-    /// Every product that is a term of one sum and is needed nowhere else. Of two in one sum it is the one that is known
-    /// later: its sum need not wait for the rounded product.
+    /// Every product that is a term of one sum and is needed nowhere else, where that lets no result wait longer: a sum
+    /// that takes a product in comes two cycles later after its other term than a plain one. Of two products in a sum it
+    /// is the one that is there later, of two at once the one that is formed first.
     pub fn of(graph: &Graph, outputs: &[Expr]) -> Contraction {
         let mut contraction = Contraction::none(graph);
-        let (needed, holds) = (graph.needed(outputs), graph.holds());
-        let mut uses = vec![0usize; graph.nodes().len()];
-        outputs.iter().for_each(|e| uses[e.node()] += 1);
-        for node in &needed {
-            operands(&graph.nodes()[*node]).for_each(|e| uses[e.node()] += 1);
-        }
-        let mut depth = vec![0usize; graph.nodes().len()];
+        let needed = graph.needed(outputs);
+        let Times { cycles, latest, uses } = Times::of(graph, outputs, &needed);
+        let mut ready = vec![0usize; graph.nodes().len()];
+        let is_free =
+            |k: &usize| matches!(graph.nodes()[*k], Node::Mul(..)) && cycles[*k] > 0 && uses[*k] == 1;
         for node in needed {
-            if !holds[node].state {
-                continue;
-            }
-            let of = |e: Expr| depth[e.node()];
-            depth[node] = match graph.nodes()[node] {
-                Node::Add(a, b) | Node::Mul(a, b) | Node::Div(a, b) => 1 + of(a).max(of(b)),
-                _ => 0,
-            };
+            ready[node] = cycles[node] + after(graph, node, &ready);
             let Node::Add(a, b) = graph.nodes()[node] else { continue };
-            let is_free =
-                |k: &usize| matches!(graph.nodes()[*k], Node::Mul(..)) && holds[*k].state && uses[*k] == 1;
-            let products = [a.node(), b.node()].into_iter().filter(is_free);
-            if let Some(product) = products.min_by_key(|k| (std::cmp::Reverse(depth[*k]), *k)) {
+            let terms = [a.node(), b.node()];
+            let products = terms.into_iter().filter(is_free);
+            let Some(product) = products.min_by_key(|k| (Reverse(ready[*k]), *k)) else { continue };
+            let other = if terms[0] == product { terms[1] } else { terms[0] };
+            let at = FUSED + ready[other].max(after(graph, product, &ready));
+            if at <= latest[node] {
+                ready[node] = at;
                 contraction.product[node] = Some(product);
                 contraction.within[product] = true;
             }
@@ -69,6 +71,48 @@ impl Contraction {
     }
 }
 
+/// What is known of every node before anything is contracted.
+struct Times {
+    /// How long it takes; nothing without the state.
+    cycles: Vec<usize>,
+    /// When it must be there so that no result comes later than the last one would.
+    latest: Vec<usize>,
+    uses: Vec<usize>,
+}
+
+impl Times {
+    fn of(graph: &Graph, outputs: &[Expr], needed: &[usize]) -> Times {
+        let nodes = graph.nodes();
+        let cycles = |(node, holds): (&Node, Holds)| match node {
+            _ if !holds.state => 0,
+            Node::Add(..) => SUM,
+            Node::Mul(..) => PRODUCT,
+            Node::Div(..) => QUOTIENT,
+            _ => 0,
+        };
+        let cycles: Vec<usize> = nodes.iter().zip(graph.holds()).map(cycles).collect();
+        let (mut ready, mut uses) = (vec![0; nodes.len()], vec![0; nodes.len()]);
+        for node in needed {
+            ready[*node] = cycles[*node] + after(graph, *node, &ready);
+            operands(&nodes[*node]).for_each(|e| uses[e.node()] += 1);
+        }
+        outputs.iter().for_each(|e| uses[e.node()] += 1);
+        let last = outputs.iter().map(|e| ready[e.node()]).max().unwrap_or(0);
+        let mut latest = vec![last; nodes.len()];
+        for node in needed.iter().rev() {
+            for operand in operands(&nodes[*node]).map(Expr::node) {
+                latest[operand] = latest[operand].min(latest[*node] - cycles[*node]);
+            }
+        }
+        Times { cycles, latest, uses }
+    }
+}
+
+/// When the operands of a node are there.
+fn after(graph: &Graph, node: usize, ready: &[usize]) -> usize {
+    operands(&graph.nodes()[node]).map(|e| ready[e.node()]).max().unwrap_or(0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -87,6 +131,20 @@ mod tests {
         assert_eq!(contraction.product_in(sum.node()), Some(late.node()));
         assert!(!contraction.is_within(early.node()) && !contraction.is_within(shared.node()));
         assert_eq!(contraction.count(), 1);
+    }
+
+    /// x·y is there when the last term of the longest sum is waited for: within it, that sum would come later.
+    #[test]
+    fn no_result_waits_longer() {
+        let b = Builder::new();
+        let [x, y, z] = [0, 1, 2].map(|i| b.input(Input::Velocity(i)));
+        let long = (0..4).fold(b.add(&x, &y), |sum, k| b.add(&b.add(&sum, &sum), &b.integer(k + 2)));
+        let late = b.add(&long, &b.mul(&x, &y));
+        let other = b.add(&z, &b.mul(&y, &z));
+        let graph = b.finish();
+        let contraction = Contraction::of(&graph, &[late, other]);
+        assert_eq!((contraction.product_in(late.node()), contraction.count()), (None, 1));
+        assert!(contraction.product_in(other.node()).is_some());
     }
 
     #[test]
