@@ -384,7 +384,8 @@ fn a_file_in_c_is_proven_and_its_mutants_are_found() {
 fn a_file_with_contraction_is_proven_and_its_mutants_are_found() {
     let path = root().join("tests/arms/scara.toml");
     for language in [Language::Rust, Language::C, Language::Cuda, Language::Wgsl] {
-        let config = Config::new(&path).language(language).functions(FUNCTIONS.to_vec());
+        // A potential energy is the same with another constant.
+        let config = Config::new(&path).language(language).functions(FUNCTIONS[..8].to_vec());
         let (plain, text) = (config.source().unwrap(), config.contract(true).source().unwrap());
         let name = if language == Language::Wgsl { "fma(" } else { "fused(" };
         assert!(!plain.contains(name) && text.matches(name).count() > 50, "{language}");
