@@ -25,7 +25,7 @@ arm!(panda_plain);
 arm!(panda_contracted);
 
 const STATES: usize = 1024;
-const ROUNDS: usize = 500;
+const ROUNDS: usize = 2000;
 
 /// Where a line of the cache begins, as the module `batch` asks for.
 #[repr(align(64))]
