@@ -7,7 +7,7 @@ use quote::quote;
 pub(super) const RUST: [&str; 4] = [
     "Contracted: fused(x, y, z) is x·y + z, rounded once. Bits differ from those of a file without --contract. The",
     "target must have it as an instruction (x86: -C target-cpu=native, or -C target-feature=+fma), and nalgebra its",
-    "feature std: otherwise it is a call that takes twenty times as long. Where the processor is asked at run time,",
+    "feature std: otherwise each is a call, and the code takes five times as long. Where the processor is asked at run time,",
     "--cfg dyngen_fma says that every call is made from code that is compiled for the instruction.",
 ];
 
