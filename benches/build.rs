@@ -1,4 +1,4 @@
-//! Generates arms of one to nine joints, for `growth.rs`.
+//! Generates arms of one to nine joints, for `growth.rs`, and two arms with and without contraction, for `contract.rs`.
 
 use dyngen::{Config, Function};
 use std::path::{Path, PathBuf};
@@ -10,6 +10,15 @@ fn main() {
         let config =
             Config::new(chain(joints, &out)).functions([Function::InverseDynamics, Function::Regressor]);
         config.build(&format!("chain{joints}.rs")).unwrap_or_else(|e| e.exit());
+    }
+    // `contract.rs` runs them where the processor has fused multiply-adds.
+    println!("cargo::rustc-cfg=dyngen_fma");
+    for arm in ["ur5e", "panda"] {
+        for (contract, name) in [(false, "plain"), (true, "contracted")] {
+            let config = Config::new(format!("../tests/arms/{arm}.toml")).contract(contract).batch(true);
+            let config = config.functions([Function::InverseDynamics]);
+            config.build(&format!("{arm}_{name}.rs")).unwrap_or_else(|e| e.exit());
+        }
     }
 }
 

@@ -85,11 +85,12 @@ impl Call {
             "friction" => texts.parse2(value).map(|terms| self.friction(&terms)),
             "batch" => syn::parse2(value).map(|batch: LitBool| self.options.batch = batch.value),
             "tests" => syn::parse2(value).map(|tests: LitBool| self.options.tests = tests.value),
+            "contract" => syn::parse2(value).map(|on: LitBool| self.options.contract = on.value),
             _ => Err(Error::new(
                 key.span(),
                 format!(
                     "there is no key `{key}`: there are file, toml, values, parameters, functions, friction, \
-                        batch, tests"
+                        batch, tests, contract"
                 ),
             )),
         };

@@ -164,6 +164,14 @@ impl Config {
         self
     }
 
+    /// Lets sums take products in: a·b + c is one operation that rounds once, on processors that have it. Bits
+    /// are then no longer those of every machine.
+    #[must_use]
+    pub fn contract(mut self, contract: bool) -> Self {
+        self.options.contract = contract;
+        self
+    }
+
     /// The generated source text; in C that of the `.c`, which includes the arm file's name with `.h`.
     ///
     /// # Errors

@@ -50,6 +50,8 @@ struct Case {
     set: SetKind,
     friction: Vec<FrictionTerm>,
     values: Option<PathBuf>,
+    /// Whether products are formed within sums.
+    contract: bool,
 }
 
 fn workspace() -> PathBuf {
@@ -78,6 +80,7 @@ fn cases() -> Vec<Case> {
         set: SetKind::Minimal,
         friction: Vec::new(),
         values: None,
+        contract: false,
     };
     let planar = Arm::read(&arms.join("planar2r.toml")).unwrap();
     let planar = Model::derive(planar).unwrap();
@@ -96,6 +99,7 @@ fn cases() -> Vec<Case> {
             ..case("lwa4p", "powerball_lwa4p", workspace().join("powerball/arm.toml"))
         },
         case("stanford", "stanford", arms.join("stanford.toml")),
+        Case { contract: true, ..case("contracted", "stanford", arms.join("stanford.toml")) },
         Case {
             set: SetKind::Full,
             friction: terms(&["coulomb", "viscous"]),
@@ -115,7 +119,8 @@ impl Case {
         let config = Config::new(&self.arm)
             .parameters(self.set)
             .functions(functions(model))
-            .friction(self.friction.clone());
+            .friction(self.friction.clone())
+            .contract(self.contract);
         match &self.values {
             Some(values) => config.values(values),
             None => config,
@@ -368,6 +373,8 @@ fn built_rust(cases: &[(Case, Model)]) -> PathBuf {
     let manifest = "[package]\nname = \"c_language\"\nversion = \"0.0.0\"\nedition = \"2024\"\n[workspace]\n[dependencies]\n\
                     nalgebra = { version = \"0.35\", default-features = false, features = [\"libm\"] }\n";
     file("Cargo.toml", manifest);
+    // No processor is asked for one here: it is a function of libm.
+    file("build.rs", "fn main() { println!(\"cargo::rustc-cfg=dyngen_fma\"); }\n");
     // The versions of this workspace, so that nothing has to be looked up.
     std::fs::copy(workspace().join("Cargo.lock"), folder().join("Cargo.lock")).unwrap();
     let (mut main, mut modules) = (RUST.to_string(), String::new());
@@ -421,7 +428,8 @@ fn c_is_rust_to_the_bit() {
         for (scalar, define) in [("f64", "-DDOUBLE"), ("f32", float.as_str())] {
             let program = folder().join(format!("{}_{scalar}", case.name));
             let output = program.to_str().unwrap();
-            compile("cc", &["-std=c99", define, "-o", output], &[source.clone(), main.clone()]);
+            let fused = format!("-D{}_FMA", case.prefix.to_uppercase());
+            compile("cc", &["-std=c99", define, &fused, "-o", output], &[source.clone(), main.clone()]);
             let expected = run(Command::new(&rust).args([case.name, scalar]), &states);
             let found = run(&mut Command::new(&program), &states);
             assert_equal(&found, &expected, &format!("{} {scalar}", case.name));
@@ -443,15 +451,15 @@ fn the_file_compiles_without_a_warning() {
         let source = folder.join(format!("{}.c", case.name));
         let friction = ["viscous", "coulomb", "tanh:200"].map(|term| term.parse::<FrictionTerm>().unwrap());
         case.config(&model).friction(friction).language(Language::C).write(&source).unwrap();
-        let float = format!("-D{}_FLOAT", case.prefix.to_uppercase());
+        let [float, fused] = ["FLOAT", "FMA"].map(|of| format!("-D{}_{of}", case.prefix.to_uppercase()));
         let strict = ["-fsyntax-only", "-Wconversion", "-Wdouble-promotion", "-Wshadow"];
         for scalar in ["-DDOUBLE", float.as_str()] {
             for compiler in ["cc", "clang"].into_iter().filter(|compiler| has(compiler)) {
-                let arguments = [&strict[..], &["-std=c99", "-Wmissing-prototypes", scalar]].concat();
+                let arguments = [&strict[..], &["-std=c99", "-Wmissing-prototypes", scalar, &fused]].concat();
                 compile(compiler, &arguments, std::slice::from_ref(&source));
             }
             for compiler in ["c++", "clang++"].into_iter().filter(|compiler| has(compiler)) {
-                let arguments = [&strict[..], &["-x", "c++", "-std=c++17", scalar]].concat();
+                let arguments = [&strict[..], &["-x", "c++", "-std=c++17", scalar, &fused]].concat();
                 compile(compiler, &arguments, std::slice::from_ref(&source));
             }
         }
@@ -460,6 +468,30 @@ fn the_file_compiles_without_a_warning() {
 
 /// The reduction of angles stands on sums that are rounded as they are written: a compiler that is set
 /// otherwise is refused.
+/// A call of a function for each sum would be no gain: nobody gets it without asking for it.
+#[test]
+fn contraction_is_refused_where_the_target_has_no_instruction_for_it() {
+    if !has("cc") || !cfg!(target_arch = "x86_64") {
+        eprintln!("skipped: there is no C compiler for x86-64");
+        return;
+    }
+    let folder = folder().join("refused");
+    std::fs::create_dir_all(&folder).unwrap();
+    let source = folder.join("gantry.c");
+    let config = Config::new(file("gantry.toml", GANTRY)).language(Language::C).contract(true);
+    config.write(&source).unwrap();
+    for float in [&[][..], &["-DGANTRY_FLOAT"]] {
+        let with = |flag: &str| {
+            let mut compiler = Command::new("cc");
+            compiler.args([flag, "-fsyntax-only"]).args(float).arg(&source).output().unwrap()
+        };
+        let without = with("-O2");
+        let text = String::from_utf8_lossy(&without.stderr);
+        assert!(!without.status.success() && text.contains("compile with -march=native or -mfma"), "{text}");
+        assert!(with("-mfma").status.success() && with("-DGANTRY_FMA").status.success());
+    }
+}
+
 #[test]
 fn fast_mathematics_is_refused() {
     if !has("cc") {

@@ -379,6 +379,46 @@ fn a_file_in_c_is_proven_and_its_mutants_are_found() {
     }
 }
 
+/// Files with contraction in every language: what is proven, and changes that are found.
+#[test]
+fn a_file_with_contraction_is_proven_and_its_mutants_are_found() {
+    let path = root().join("tests/arms/scara.toml");
+    for language in [Language::Rust, Language::C, Language::Cuda, Language::Wgsl] {
+        // A potential energy is the same with another constant.
+        let config = Config::new(&path).language(language).functions(FUNCTIONS[..8].to_vec());
+        let (plain, text) = (config.source().unwrap(), config.contract(true).source().unwrap());
+        let name = if language == Language::Wgsl { "fma(" } else { "fused(" };
+        assert!(!plain.contains(name) && text.matches(name).count() > 50, "{language}");
+        let verifier = Verifier::new(Arm::read(&path).unwrap(), language, &text).unwrap();
+        assert_eq!(verifier.verify(&text, None).unwrap().difference, None, "{language}");
+        let call = text.rfind(&format!("= {name}")).unwrap();
+        let line = &text[call..call + text[call..].find(';').unwrap()];
+        let arguments = line.trim_end_matches(')').split_once('(').unwrap().1;
+        let of: Vec<&str> = arguments.split(", ").collect();
+        let [x, y, z] = of[..] else { panic!("{line}") };
+        let mut changes = vec![
+            (line.to_string(), format!("= {name}{x}, {z}, {y})")),
+            (line.to_string(), format!("= {name}{x}, {y}, -{z})").replace("--", "")),
+            (line.to_string(), format!("= {name}{x}, {y})")),
+            (line.to_string(), format!("= other({x}, {y}, {z})")),
+        ];
+        changes.extend(match language {
+            Language::Rust => vec![("x.simd_mul_add(y, z)".to_string(), "x.simd_mul_add(z, y)".to_string())],
+            Language::Wgsl => Vec::new(),
+            _ => vec![
+                ("fma(x, y, z)".to_string(), "fma(x, z, y)".to_string()),
+                ("#define fused(x, y, z) fmaf(x, y, z)".to_string(), String::new()),
+            ],
+        });
+        for (old, new) in changes {
+            let at = text.rfind(&old).unwrap_or_else(|| panic!("{language}: {old}"));
+            let changed = format!("{}{new}{}", &text[..at], &text[at + old.len()..]);
+            let found = verifier.verify(&changed, None);
+            assert!(found.is_err() || found.unwrap().difference.is_some(), "{language}: {old} -> {new}");
+        }
+    }
+}
+
 /// What the command reports about a text as a generated file: its exit code, standard output and error.
 fn command(name: &str, text: &str, arm: &str, more: &[&str]) -> (Option<i32>, String, String) {
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);

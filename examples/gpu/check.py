@@ -6,7 +6,8 @@
     python3 examples/gpu/check.py --dyngen target/release/dyngen
 
 1. Each file is what `dyngen verify` proves.
-2. NVRTC compiles the CUDA for a GPU without a word, in both precisions, and contracts nothing.
+2. NVRTC compiles the CUDA for a GPU without a word, in both precisions, and contracts nothing unless it
+   was generated with --contract.
 3. Kernels in CUDA, compiled by g++ without their qualifiers and called thread by thread, give the bits of
    the C.
 4. Entry points in WGSL give the results of the C in double precision up to rounding, on whatever device
@@ -30,8 +31,12 @@ import numpy as np
 from generated import InC, random_inputs
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-# One has a joint that slides.
-ARMS = ["tests/arms/ur5e.toml", "tests/arms/stanford.toml"]
+# One has a joint that slides; with the options for `generate`.
+ARMS = [
+    ("tests/arms/ur5e.toml", []),
+    ("tests/arms/stanford.toml", []),
+    ("tests/arms/stanford.toml", ["--contract"]),
+]
 FUNCTIONS = [
     "inverse_dynamics",
     "regressor",
@@ -63,15 +68,16 @@ extern "C" { index blockIdx, blockDim, threadIdx; }
 class Files:
     """The files of an arm in a folder."""
 
-    def __init__(self, dyngen, arm, folder):
+    def __init__(self, dyngen, arm, options, folder):
+        self.contracted = "--contract" in options
         text = (ROOT / arm).read_text().replace("[[joint]]\n", "[[joint]]\n" + LIMITS)
         self.arm = folder / pathlib.Path(arm).name
         self.arm.write_text(text)
         self.folder = folder
         for language, end in [("c", ".c"), ("cuda", ".cu"), ("wgsl", ".wgsl")]:
             file = self.arm.with_suffix(end)
-            options = ["--language", language, "--functions", ",".join(FUNCTIONS), "-o", file]
-            subprocess.run([dyngen, "generate", self.arm, *options], check=True)
+            asked = ["--language", language, "--functions", ",".join(FUNCTIONS), "-o", file, *options]
+            subprocess.run([dyngen, "generate", self.arm, *asked], check=True)
             proven = subprocess.run(
                 [dyngen, "verify", file, self.arm], check=True, capture_output=True, text=True
             ).stdout
@@ -123,7 +129,8 @@ def check_compiled(files, nvrtc):
         assert code and not log.strip("\0\n "), f"{files.arm.name} {c.kind}: {log}"
         assert code.count(".entry") == len(FUNCTIONS), code.count(".entry")
         # The library's sine of large doubles asks for them by name.
-        assert c.kind == np.float64 or "fma." not in code, f"{files.arm.name}: contracted"
+        fused = "fma." in code
+        assert c.kind == np.float64 or fused == files.contracted, f"{files.arm.name}: contracted: {fused}"
     code, log = nvrtc.compiled(files.cuda, ["--use_fast_math"])
     assert code is None and "without --use_fast_math" in log, log
     print(f"{files.arm.stem}: NVRTC compiles {len(FUNCTIONS)} kernels in both precisions")
@@ -254,9 +261,9 @@ def main():
     parser.add_argument("--dyngen", default="target/release/dyngen", help="the command")
     args = parser.parse_args()
     nvrtc, gpu = Nvrtc(), device()
-    for arm in ARMS:
+    for arm, options in ARMS:
         with tempfile.TemporaryDirectory() as folder:
-            files = Files(pathlib.Path(args.dyngen).resolve(), arm, pathlib.Path(folder))
+            files = Files(pathlib.Path(args.dyngen).resolve(), arm, options, pathlib.Path(folder))
             check_compiled(files, nvrtc)
             check_bits(files)
             if gpu:

@@ -22,7 +22,7 @@ fn functions(names: Option<Vec<String>>) -> PyResult<Option<Vec<Function>>> {
 
 /// What `dyngen generate` writes.
 #[pyfunction]
-#[pyo3(signature = (arm, parameters, names, values, friction, batch, tests))]
+#[pyo3(signature = (arm, parameters, names, values, friction, batch, tests, contract))]
 pub(crate) fn generate(
     py: Python<'_>,
     arm: &Arm,
@@ -32,6 +32,7 @@ pub(crate) fn generate(
     friction: Vec<String>,
     batch: bool,
     tests: bool,
+    contract: bool,
 ) -> PyResult<String> {
     let model = arm.model(py)?;
     let friction: Result<Vec<FrictionTerm>, String> = friction.iter().map(|term| term.parse()).collect();
@@ -42,6 +43,7 @@ pub(crate) fn generate(
         friction: friction.map_err(value)?,
         batch,
         tests,
+        contract,
     };
     work::run(py, None, move |_| emit::source(&model, &options))?.map_err(refused)
 }

@@ -7,7 +7,7 @@ use dyngen::base::choice;
 use dyngen::base::sets::{Class, combination_text};
 use dyngen::base::symmetry::{Removed, Symmetry};
 use dyngen::base::{ParameterSet, SetKind};
-use dyngen::describe::{Description, Rounding, Weak, exact_rows, why_unbounded};
+use dyngen::describe::{BoundsFor, Description, Rounding, Weak, exact_rows, why_unbounded};
 use dyngen::exact::rational::{self, Rational};
 use dyngen::graph::Operations;
 use dyngen::{Function, Model, Values};
@@ -24,6 +24,9 @@ pub(super) struct Args {
     /// Parameter values, JSON, for which rounding is bounded; without them each parameter is within ±1 SI unit.
     #[arg(long, value_name = "FILE.json")]
     values: Option<PathBuf>,
+    /// Bound the rounding of code that is generated with --contract.
+    #[arg(long)]
+    contract: bool,
     /// One JSON object on standard output.
     #[arg(long)]
     json: bool,
@@ -43,9 +46,9 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         links = model.set(SetKind::Full).ok().and_then(|full| given.of_set(&model, full).ok());
     }
     let progress = Progress::new(model.arm());
-    let description =
-        Description::with_progress(&model, values.as_deref(), links.as_deref(), |what| progress.say(what))
-            .map_err(Failure::refused)?;
+    let bounds = BoundsFor { values: values.as_deref(), links: links.as_deref(), contracted: args.contract };
+    let description = Description::with_progress(&model, bounds, |what| progress.say(what));
+    let description = description.map_err(Failure::refused)?;
     drop(progress);
     let digits = if args.exact { Digits::All } else { Digits::Six };
     let text = match args.json {
@@ -238,7 +241,8 @@ fn rounding_table(t: &mut String, arm: &Arm, rounding: &Rounding) {
     let _ = writeln!(
         t,
         "\nrounding: |emitted − exact| of each function's worst entry, in its unit, for every state within the \
-         limits\n(parameters: {}):",
+         limits\n({}parameters: {}):",
+        if rounding.contracted { "code with --contract; " } else { "" },
         rounding.parameters.text()
     );
     let _ = writeln!(t, "  {:<36} {:>8} {:>8}  decimals that hold in f32, f64", "function", "f32", "f64");

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 #[derive(clap::Args)]
 #[command(after_help = format!("{}\n\nExample: dyngen generate arm.toml -o arm.rs --parameters minimal --functions \
         regressor,mass_matrix\n         dyngen generate arm.toml --language c -o arm.c\n         dyngen generate \
-        arm.toml --language cuda -o arm.cu", list_of_functions()))]
+        arm.toml --language cuda -o arm.cu\n         dyngen generate arm.toml --batch --contract -o arm.rs", list_of_functions()))]
 pub(super) struct Args {
     /// The arm file.
     arm: PathBuf,
@@ -38,6 +38,10 @@ pub(super) struct Args {
     /// Emit the arm's own consistency tests too (Rust).
     #[arg(long)]
     tests: bool,
+    /// Let sums take products in: a*b + c is one operation that rounds once (fused multiply-add), for
+    /// processors that have it. Bits are then no longer those of every machine.
+    #[arg(long)]
+    contract: bool,
     /// Write over a file that dyngen has not generated.
     #[arg(long)]
     force: bool,
@@ -75,7 +79,8 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
         })
         .friction(args.friction.clone())
         .batch(args.batch)
-        .tests(args.tests);
+        .tests(args.tests)
+        .contract(args.contract);
     if let Some(functions) = &args.functions {
         config = config.functions(functions.clone());
     }

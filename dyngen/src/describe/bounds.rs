@@ -31,16 +31,18 @@ impl ParameterRange {
 pub struct Rounding {
     /// For which parameters they hold.
     pub parameters: ParameterRange,
+    /// Whether they are of code with contraction.
+    pub contracted: bool,
     /// Each function with its bounds, or with the limit that the arm file lacks for it.
     pub functions: Vec<(Function, Result<Bounds, String>)>,
 }
 
 impl Rounding {
     /// None yet; no bounds are to be had where no joint has limits of its position.
-    pub(super) fn of(arm: &Arm, values: Option<&[f64]>) -> Option<Rounding> {
+    pub(super) fn of(arm: &Arm, values: Option<&[f64]>, contracted: bool) -> Option<Rounding> {
         let limited = |joint: &Joint| joint.mimic.is_none() && joint.position.is_some();
         let parameters = if values.is_some() { ParameterRange::Values } else { ParameterRange::Unit };
-        arm.joints.iter().any(limited).then(|| Rounding { parameters, functions: Vec::new() })
+        arm.joints.iter().any(limited).then(|| Rounding { parameters, contracted, functions: Vec::new() })
     }
 
     /// By function, `f32` and `f64` by output; null with the reason where there is no bound.

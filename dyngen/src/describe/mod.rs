@@ -9,7 +9,7 @@ pub use weak::Weak;
 use crate::arm::{Arm, Joint, Transmission};
 use crate::base::sets::{Class, combination_text};
 use crate::base::symmetry::{self, Removed, Symmetry};
-use crate::dynamics::Function;
+use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::rational;
 use crate::graph::{Operations, Preparation};
 use crate::model::{Error, Model};
@@ -33,34 +33,43 @@ pub struct Description {
     pub rounding: Option<Rounding>,
 }
 
+/// For what code and for which numbers rounding is bounded.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BoundsFor<'v> {
+    /// Values of the minimal set; without them each parameter is within ±1 SI unit.
+    pub values: Option<&'v [f64]>,
+    /// The same values in the full set, where they are known.
+    pub links: Option<&'v [f64]>,
+    /// Whether products are formed within sums.
+    pub contracted: bool,
+}
+
 impl Description {
     /// Builds and proves every function to count its operations.
     ///
     /// # Errors
     /// As [`Model::function`].
     pub fn of(model: &Model) -> Result<Description, Error> {
-        Description::with_progress(model, None, None, |_| {})
+        Description::with_progress(model, BoundsFor::default(), |_| {})
     }
 
-    /// As [`Self::of`], with progress reported; with bounds of rounding for these `values` of the
-    /// minimal set, where there are any, and those of the full set, `links`, where they are known too.
+    /// As [`Self::of`], with progress reported and bounds of rounding for what is given.
     ///
     /// # Errors
     /// As [`Model::function`].
     pub fn with_progress(
         model: &Model,
-        values: Option<&[f64]>,
-        links: Option<&[f64]>,
+        BoundsFor { values, links, contracted }: BoundsFor<'_>,
         say: impl Fn(&str),
     ) -> Result<Description, Error> {
         let mut preparation = Preparation::default();
         let mut operations = Vec::new();
-        let mut rounding = Rounding::of(model.arm(), values);
+        let mut rounding = Rounding::of(model.arm(), values, contracted);
         let functions: Vec<Function> = model.functions(SetKind::Minimal).collect();
         let bounded = rounding.is_some();
         let bounder = Bounder::new(model, values).with_links(links);
         let of = |function: Function| {
-            let built = model.function(function, SetKind::Minimal)?;
+            let built = FunctionGraph { contracted, ..model.function(function, SetKind::Minimal)? };
             let bounds = bounded.then(|| bounder.bounds(&built));
             Ok::<_, Error>((built, bounds))
         };
@@ -118,6 +127,9 @@ impl Description {
         });
         if let Some(rounding) = &self.rounding {
             object["rounding"] = rounding.json();
+            if rounding.contracted {
+                object["contract"] = json!(true);
+            }
             object["rounding_parameters"] = json!(rounding.parameters.text());
         }
         object

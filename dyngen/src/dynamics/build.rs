@@ -18,7 +18,7 @@ use crate::exact::elimination::Dependence;
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::differentiate::{self, Direction};
-use crate::graph::{Builder, Expr, Graph, Input, Operations, Preparation};
+use crate::graph::{Builder, Contraction, Expr, Graph, Input, Operations, Preparation};
 use crate::lagrangian::elements::{ArmElements, PlacementElements, Source};
 use crate::optimize::{self, COMPARED, Pass};
 use crate::parameters::{ParameterSet, SetParameter};
@@ -40,6 +40,8 @@ pub struct FunctionGraph {
     pub parameters: usize,
     /// Whether the parameters' values are constants of the graph.
     pub baked: bool,
+    /// Whether its code forms products within sums.
+    pub contracted: bool,
 }
 
 impl FunctionGraph {
@@ -53,6 +55,14 @@ impl FunctionGraph {
     pub fn without_preparation(&self, preparation: &mut Preparation) -> FunctionGraph {
         let (graph, outputs) = preparation.take_out(&self.graph, &self.outputs);
         FunctionGraph { graph, outputs, ..self.clone() }
+    }
+
+    /// The products that its code forms within sums.
+    pub fn contraction(&self) -> Contraction {
+        match self.contracted {
+            true => Contraction::of(&self.graph, &self.outputs),
+            false => Contraction::none(&self.graph),
+        }
     }
 
     /// The function's arguments, without the parameters if their values are baked in.
@@ -144,7 +154,8 @@ pub fn build_in(
     let (graph, outputs) = optimize::optimize(graph, outputs, subject.field, passes);
     let (joints, parameters) = (subject.arm.dof(), set.parameters.len());
     let shape = function.shape(joints, parameters);
-    FunctionGraph { function, graph, outputs, shape, joints, parameters, baked: baked.is_some() }
+    let baked = baked.is_some();
+    FunctionGraph { function, graph, outputs, shape, joints, parameters, baked, contracted: false }
 }
 
 /// The parts of functions in one form, as expressions of one graph: the chain, its links' bodies and rates.

@@ -3,10 +3,10 @@
 use super::angles::{positions, trig_of, uses_positions};
 use super::docs;
 use super::lanes::used;
-use super::statement::{self, Value, input_of, is_number};
+use super::statement::{self, Form, Value, input_of, is_number};
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::{Argument, Size};
-use crate::graph::{Expr, Graph, Input, Node, Preparation, operands};
+use crate::graph::{Expr, Graph, Input, Node, Preparation};
 use crate::model::Model;
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{ToTokens, format_ident, quote};
@@ -31,9 +31,9 @@ pub(super) fn function(model: &Model, built: &FunctionGraph, prepared: usize) ->
         true => (quote!(q), quote!(trig)),
         false => (quote!(_q), quote!(_trig)),
     };
-    let signs = statement::signs_of(built, &needed);
-    let statements = sections(model, &built.graph, &built.outputs, &needed, &signs);
-    let (result, value) = result(built, &signs);
+    let form = Form::of(built, &needed);
+    let statements = sections(model, &built.graph, &built.outputs, &needed, &form);
+    let (result, value) = result(built, &form);
     let structure = structure(built);
     // Where the result is a number, the last `let` is the result.
     let lint = is_number(built).then(|| quote!(#[allow(clippy::let_and_return)]));
@@ -153,8 +153,7 @@ pub(super) fn preparation(model: &Model, preparation: &Preparation) -> TokenStre
             quote!(let #name = parameters[#i];)
         })
         .collect();
-    let signs = vec![false; graph.nodes().len()];
-    let statements = sections(model, &graph, preparation.values(), &needed, &signs);
+    let statements = sections(model, &graph, preparation.values(), &needed, &Form::plain(&graph));
     let values = preparation.values().iter().map(|e| value_name(&graph, e.node()));
     let operations = preparation.operations();
     let doc = format!(" Operations: {} multiplications, {} additions.", operations.mul, operations.add);
@@ -210,18 +209,17 @@ fn sections(
     graph: &Graph,
     outputs: &[Expr],
     needed: &[usize],
-    signs: &[bool],
+    form: &Form,
 ) -> Vec<TokenStream> {
-    let computed: Vec<usize> =
-        needed.iter().copied().filter(|n| !matches!(graph.nodes()[*n], Node::Input(_))).collect();
-    let statement = |n: &usize| statement(model, graph, *n, signs);
+    let computed: Vec<usize> = needed.iter().copied().filter(|n| form.is_computed(graph, *n)).collect();
+    let statement = |n: &usize| statement(model, graph, *n, form);
     if computed.len() <= 2 * SECTION {
         return computed.iter().filter_map(statement).collect();
     }
     let mut last_use = vec![0; graph.nodes().len()];
     for (position, node) in computed.iter().enumerate() {
-        for operand in operands(&graph.nodes()[*node]) {
-            last_use[operand.node()] = position;
+        for read in form.reads(graph, *node) {
+            last_use[read] = position;
         }
     }
     for output in outputs {
@@ -243,12 +241,12 @@ fn sections(
     blocks
 }
 
-/// The `let` of a node; inputs are bound already. `signs` are those of [`super::signs::held`].
-fn statement(model: &Model, graph: &Graph, node: usize, signs: &[bool]) -> Option<TokenStream> {
+/// The `let` of a node; inputs are bound already.
+fn statement(model: &Model, graph: &Graph, node: usize, form: &Form) -> Option<TokenStream> {
     let name = value_name(graph, node);
     let ident = |name: String| Ident::new(&name, Span::call_site());
     let two = |x: String, y: String| (ident(x), ident(y));
-    Some(match statement::value(model, graph, node, signs)? {
+    Some(match statement::value(model, graph, node, form)? {
         Value::Number(x) => {
             let x = Literal::f64_suffixed(x);
             quote!(let #name: T = nalgebra::convert(#x);)
@@ -273,6 +271,13 @@ fn statement(model: &Model, graph: &Graph, node: usize, signs: &[bool]) -> Optio
             let (x, y) = two(x, y);
             quote!(let #name = #x / #y;)
         }
+        Value::Fused { factors: [x, y], addend, negative: [product, other] } => {
+            let (x, y) = two(x, y);
+            let addend = ident(addend);
+            let x = if product { quote!(-#x) } else { quote!(#x) };
+            let addend = if other { quote!(-#addend) } else { quote!(#addend) };
+            quote!(let #name = fused(#x, #y, #addend);)
+        }
     })
 }
 
@@ -281,10 +286,10 @@ fn value_name(graph: &Graph, node: usize) -> Ident {
 }
 
 /// The type of the result and the expression that makes it. nalgebra stores columns.
-fn result(built: &FunctionGraph, signs: &[bool]) -> (TokenStream, TokenStream) {
+fn result(built: &FunctionGraph, form: &Form) -> (TokenStream, TokenStream) {
     let (rows, columns) = built.shape;
     let value = |i: usize, j: usize| {
-        let (is_negative, name) = statement::result(built, signs, i * columns + j);
+        let (is_negative, name) = statement::result(built, form, i * columns + j);
         let name = Ident::new(&name, Span::call_site());
         if is_negative { quote!(-#name) } else { quote!(#name) }
     };

@@ -1,6 +1,6 @@
 //! The words of a generated file: its head, and the documentation of each function.
 
-use super::Options;
+use super::{Options, fused};
 use crate::dynamics::FunctionGraph;
 use crate::model::Model;
 use crate::parameters::{ParameterSet, SetKind};
@@ -11,11 +11,20 @@ pub(super) fn head(model: &Model, options: &Options, rounded: Vec<String>) -> St
         "Needs: nalgebra 0.35 (default-features = false and feature libm where there is no std).",
         "Every function is proven equal to the Lagrangian of the arm; none allocates or panics.",
     ];
-    head_lines(model, options, &needs).iter().chain(&rounded).map(|line| format!("// {line}\n")).collect()
+    head_lines(model, options, &needs, &fused::RUST)
+        .iter()
+        .chain(&rounded)
+        .map(|line| format!("// {line}\n"))
+        .collect()
 }
 
-/// The lines at the head of a file, among them what a language needs.
-pub(super) fn head_lines(model: &Model, options: &Options, needs: &[&str]) -> Vec<String> {
+/// The lines at the head of a file, among them what a language needs, and what `contracted` code does.
+pub(super) fn head_lines(
+    model: &Model,
+    options: &Options,
+    needs: &[&str],
+    contracted: &[&str],
+) -> Vec<String> {
     let arm = model.arm();
     let mut lines = vec![
         format!(
@@ -26,7 +35,8 @@ pub(super) fn head_lines(model: &Model, options: &Options, needs: &[&str]) -> Ve
         "generate again.".to_string(),
         format!("Arm: {:016x} (hash of its description). Parameter set: {}.", arm.hash(), options.parameters),
     ];
-    lines.extend(needs.iter().map(|line| (*line).to_string()));
+    let contracted = contracted.iter().filter(|_| options.contract);
+    lines.extend(needs.iter().chain(contracted).map(|line| (*line).to_string()));
     lines.extend(arm.notes().into_iter().map(|note| format!("Note: {note}")));
     // What a name brings of line breaks would end the comment.
     lines.into_iter().map(|line| line.replace(char::is_control, " ")).collect()
@@ -69,9 +79,13 @@ pub(super) fn function(built: &FunctionGraph) -> String {
     let operations = built.operations();
     let divisions =
         if operations.div > 0 { format!(", {} divisions", operations.div) } else { String::new() };
+    let fused = match built.contraction().count() {
+        0 => String::new(),
+        count => format!("\n{count} of the multiplications are formed within additions."),
+    };
     format!(
         "{what}\n{arguments}\n\n{returns}\n\n\
-         Operations: {} multiplications, {} additions{divisions}, {} sines with cosines.",
+         Operations: {} multiplications, {} additions{divisions}, {} sines with cosines.{fused}",
         operations.mul, operations.add, operations.sin_cos
     )
 }

@@ -10,6 +10,7 @@ mod code;
 pub(crate) mod discrete;
 mod docs;
 mod friction;
+mod fused;
 mod lanes;
 mod names;
 mod rounded;
@@ -49,6 +50,8 @@ pub struct Options {
     pub batch: bool,
     /// Whether the arm's own consistency tests are emitted too.
     pub tests: bool,
+    /// Whether sums take products in: a·b + c, rounded once.
+    pub contract: bool,
 }
 
 impl Default for Options {
@@ -61,6 +64,7 @@ impl Default for Options {
             friction: Vec::new(),
             batch: false,
             tests: false,
+            contract: false,
         }
     }
 }
@@ -155,12 +159,15 @@ fn items(model: &Model, options: &Options, parts: &Parts<'_>) -> Result<TokenStr
     let trig = angles::trig_struct(model);
     let angle_functions = angles::angle_functions(model, parts.all().map(|(_, built)| built));
     let trigonometry = angles::trigonometry(model.arm());
+    let fused = options.contract.then(fused::in_rust);
     let friction = friction::items(&options.friction, model.arm());
     let tests = if options.tests { tests::module(model, options)? } else { quote!() };
     Ok(allowed_unused(quote! {
         use nalgebra::{ArrayStorage, SMatrix, SVector, SimdRealField};
 
         #constants
+
+        #fused
 
         #trig
 
@@ -222,6 +229,7 @@ fn built(
                 Some(values) => model.baked_function(function, options.parameters, values)?,
                 None => model.function(function, options.parameters)?,
             };
+            let built = FunctionGraph { contracted: options.contract, ..built };
             Ok(built.without_preparation(preparation))
         })
         .collect()

@@ -1,7 +1,7 @@
 //! Lines of straight-line code in the languages that write values, sums, fields and indices as C does.
 
 use super::angles::{Term, terms};
-use super::statement::{self, Value, input_of};
+use super::statement::{self, Form, Value, input_of};
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::Argument;
 use crate::graph::{Graph, Input, JointSum, Node};
@@ -16,25 +16,31 @@ pub(super) struct Syntax {
     pub(super) field: &'static str,
     /// A number, rounded to those of the file.
     pub(super) number: fn(f64) -> String,
+    /// The function that gives a·b + c.
+    pub(super) fused: &'static str,
 }
 
 impl Syntax {
-    /// The lines of a graph's nodes. `signs` are those of [`super::signs::held`].
+    /// The lines of a graph's nodes.
     pub(super) fn statements(
         &self,
         model: &Model,
         graph: &Graph,
         needed: &[usize],
-        signs: &[bool],
+        form: &Form,
     ) -> Vec<String> {
         let line = |node: &usize| {
-            let value = match statement::value(model, graph, *node, signs)? {
+            let value = match statement::value(model, graph, *node, form)? {
                 Value::Number(x) => (self.number)(x),
                 Value::Sum(x, y) => format!("{x} + {y}"),
                 Value::Difference(x, y) => format!("{x} - {y}"),
                 Value::NegativeSum(x, y) => format!("-{x} - {y}"),
                 Value::Product(x, y) => format!("{x} * {y}"),
                 Value::Quotient(x, y) => format!("{x} / {y}"),
+                Value::Fused { factors: [x, y], addend, negative } => {
+                    let [first, third] = negative.map(|minus| if minus { "-" } else { "" });
+                    format!("{}({first}{x}, {y}, {third}{addend})", self.fused)
+                }
             };
             Some(self.named(&statement::value_name(graph, *node), &value))
         };

@@ -4,6 +4,7 @@
 //! their node, and sums and products are stored with the sign pulled out. Constants are exact.
 
 mod build;
+mod contraction;
 pub mod differentiate;
 pub mod evaluate;
 mod joint_sum;
@@ -11,6 +12,7 @@ mod preparation;
 pub mod tape;
 
 pub use build::Builder;
+pub use contraction::Contraction;
 pub use joint_sum::JointSum;
 pub use preparation::Preparation;
 

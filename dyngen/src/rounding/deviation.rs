@@ -33,7 +33,7 @@ impl Program {
                 Operation::Mul(a, b) if self.is_power_of_two(a) || self.is_power_of_two(b) => TINY,
                 _ => rounds(value, from_operands),
             };
-            if k >= self.emitted {
+            if self.rounds_nothing(k) {
                 error = EXACT;
             }
             errors.push(error);

@@ -43,6 +43,8 @@ pub(super) struct Emitted {
     pub(super) operations: Vec<Operation>,
     /// Of each operation its node in the function's graph.
     pub(super) nodes: Vec<usize>,
+    /// Whether it is a product that is formed within a sum, which rounds for both.
+    pub(super) within: Vec<bool>,
     pub(super) angles: Vec<(JointSum, Angle)>,
     /// What it reads.
     pub(super) variables: Vec<Variable>,
@@ -53,8 +55,10 @@ impl Emitted {
     pub(super) fn new(model: &Model, built: &FunctionGraph, outputs: &[Expr]) -> Option<Emitted> {
         let graph = &built.graph;
         let nodes = graph.needed(outputs);
+        let contraction = built.contraction();
+        let within = nodes.iter().map(|node| contraction.is_within(*node)).collect();
         let (operations, angles, variables) = (Vec::new(), Vec::new(), Vec::new());
-        let mut emitted = Emitted { operations, nodes, angles, variables };
+        let mut emitted = Emitted { operations, nodes, within, angles, variables };
         let mut place = vec![0; graph.nodes().len()];
         for k in 0..emitted.nodes.len() {
             let node = emitted.nodes[k];
@@ -103,6 +107,8 @@ pub(super) struct Program {
     /// The emitted operations stand first; the rest is computed here alone and rounds nothing.
     pub(super) operations: Vec<Operation>,
     pub(super) emitted: usize,
+    /// Those that round nothing, because the sum that they are in does: emitted products.
+    within: Vec<bool>,
     /// Of each emitted operation the derivative of the output by it.
     pub(super) slopes: Vec<Option<usize>>,
     /// Better bounds for some operations.
@@ -131,7 +137,7 @@ impl Program {
         output: usize,
         facts: Option<&Facts<'_>>,
     ) -> Option<Program> {
-        let Emitted { mut operations, nodes, angles, variables } =
+        let Emitted { mut operations, nodes, within, angles, variables } =
             Emitted::new(model, built, &built.outputs[output..=output])?;
         let emitted = operations.len();
         let slopes = slopes::append(&mut operations);
@@ -140,7 +146,7 @@ impl Program {
             Some(facts) => Some(facts.of(&operations, &nodes)?),
             None => None,
         };
-        Some(Program { operations, emitted, slopes, norms, known, angles, variables })
+        Some(Program { operations, emitted, within, slopes, norms, known, angles, variables })
     }
 
     /// How many operations it is.
@@ -193,7 +199,7 @@ impl Program {
                 }
                 Operation::Div(a, b) => rounded(of(a).times(of(b).inverse()?.widened(0.0))),
             };
-            if k >= self.emitted {
+            if self.rounds_nothing(k) {
                 error = EXACT;
             }
             let mut value = value.widened(error[0]);
@@ -208,6 +214,11 @@ impl Program {
             values.push(value);
         }
         Some(())
+    }
+
+    /// Whether an operation is computed here alone, or within a sum.
+    pub(super) fn rounds_nothing(&self, operation: usize) -> bool {
+        self.within.get(operation).is_none_or(|within| *within)
     }
 
     /// Whether products with it only change exponents.

@@ -63,6 +63,8 @@ pub(super) struct Cursor<'a> {
     last: usize,
     /// Where literals stand: the function, then a space and the name of a value.
     pub(super) place: String,
+    /// The function that gives x·y + z; empty where the file has none.
+    pub(super) fused: &'static str,
     /// Literals of many digits that the head does not explain, with their lines.
     pub(super) unexplained: Vec<(usize, String)>,
 }
@@ -76,6 +78,7 @@ impl<'a> Cursor<'a> {
             last: all.last().map_or(1, |token| token.0),
             tokens: all.into_iter().peekable(),
             place: String::new(),
+            fused: "",
             unexplained: Vec::new(),
         }
     }
@@ -197,6 +200,7 @@ impl<'a> Cursor<'a> {
                 };
                 self.literal(line, digits)?
             }
+            name if name == self.fused && self.takes("(") => return self.product_and_sum(line),
             word if word.starts_with(|c: char| c.is_ascii_lowercase()) => {
                 let name = Expr { line, kind: Kind::Name(word.to_string()) };
                 if self.takes(self.dialect.field) {
@@ -220,6 +224,17 @@ impl<'a> Cursor<'a> {
             _ => return wrong(line, "an expression that dyngen does not write"),
         };
         Ok(Expr { line, kind })
+    }
+
+    /// `x, y, z)`: x·y + z.
+    fn product_and_sum(&mut self, line: usize) -> Checked<Expr> {
+        let x = self.sum()?;
+        self.expect(",")?;
+        let y = self.sum()?;
+        self.expect(",")?;
+        let z = self.sum()?;
+        self.expect(")")?;
+        Ok(Expr::fused(line, [x, y, z]))
     }
 
     fn literal(&mut self, line: usize, digits: &str) -> Checked<Kind> {

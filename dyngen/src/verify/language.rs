@@ -257,6 +257,12 @@ fn bind<'e>(line: usize, pattern: &'e Pattern, value: Value, names: &mut Names<'
 }
 
 impl Expr {
+    /// x·y + z
+    pub(super) fn fused(line: usize, [x, y, z]: [Expr; 3]) -> Expr {
+        let product = Expr { line, kind: Kind::Binary('*', Box::new(x), Box::new(y)) };
+        Expr { line, kind: Kind::Binary('+', Box::new(product), Box::new(z)) }
+    }
+
     /// The line of the statement that gives entry (row, column) of a result of columns; the expression's own where
     /// it is not found.
     pub(super) fn line_of_entry(&self, row: usize, column: usize) -> usize {

@@ -23,9 +23,12 @@ const AROUND: &str = "
         fn prepared(&self) -> Prepared<T> { prepare(self) }
     }
     impl<T: Copy> Parameters<T> for Prepared<T> { fn prepared(&self) -> Prepared<T> { *self } }
+    fn fused<T: SimdRealField + Copy>(x: T, y: T, z: T) -> T { x.simd_mul_add(y, z) }
 ";
 /// Sines and cosines, tested where they are written.
 const TRIGONOMETRY: &str = include_str!("../emit/trigonometry.rs");
+/// The function that gives x·y + z.
+const FUSED: &str = "fused";
 /// Items that are read by nothing that is proven.
 const UNREAD: [&str; 5] = ["FRICTION_TERMS", "MOTOR_VELOCITIES", "sign", "friction_columns", "friction"];
 
@@ -122,6 +125,9 @@ impl Reader<'_> {
                     self.source.not_checked.push(format!("{}{name}", self.module));
                     return Ok(());
                 }
+                if name == FUSED && self.around.contains(&plain(item)) {
+                    return Ok(());
+                }
                 let known = Function::parse(name.strip_suffix("_with").unwrap_or(&name)).is_some();
                 if !known && name != "prepare" && !name.starts_with("angles_") {
                     return wrong(line(f), &format!("dyngen writes no function {name}"));
@@ -130,6 +136,9 @@ impl Reader<'_> {
             }
             syn::Item::Const(item) => {
                 harmless(&item.attrs)?;
+                if is_condition(item) {
+                    return Ok(());
+                }
                 self.constant(item)
             }
             syn::Item::Impl(item) if plain(&item.self_ty) == "Trig < T > " && item.trait_.is_none() => {
@@ -365,6 +374,10 @@ impl Reader<'_> {
                 let angles = Kind::Call(plain(&arguments[1]).trim().to_string(), of);
                 Kind::SinCos(Box::new(Expr { line: at, kind: angles }))
             }
+            (FUSED, 3) => match <[Expr; 3]>::try_from(self.expressions(arguments)?) {
+                Ok(of) => return Ok(Expr::fused(at, of).kind),
+                Err(_) => return wrong(at, "three numbers are expected here"),
+            },
             ("Trig :: new", 1) => Kind::Call("Trig::new".to_string(), self.expressions(arguments)?),
             (name, _) => {
                 let inside = self.own.len() > 1 && self.own.last().is_some_and(|own| own.contains(name));
@@ -422,6 +435,12 @@ fn pattern(of: &syn::Pat) -> Checked<Pattern> {
         }
         other => return wrong(line(other), "a pattern that dyngen does not write"),
     })
+}
+
+/// Whether a constant says on which targets a file compiles: it has no name and no value.
+fn is_condition(item: &syn::ItemConst) -> bool {
+    let asserts = |of: &syn::ExprMacro| of.mac.path.is_ident("assert") && plain(&item.ty) == "( ) ";
+    item.ident == "_" && matches!(&*item.expr, syn::Expr::Macro(of) if asserts(of))
 }
 
 /// Attributes that change nothing of what is computed.

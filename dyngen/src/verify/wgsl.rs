@@ -36,6 +36,7 @@ pub(super) fn read(text: &str, literals: &Literals, frames: &[String]) -> Checke
         bound: BTreeSet::new(),
         source: Source::default(),
     };
+    reader.text.fused = "fma";
     for list in ["joint_names", "parameter_names"] {
         reader.listed(text, list);
     }

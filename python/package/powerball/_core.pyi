@@ -189,6 +189,7 @@ def generate(
     friction: List[str],
     batch: bool,
     tests: bool,
+    contract: bool,
 ) -> str: ...
 def generate_model(
     arm: Arm, model: _Text, scalar: str, names: Optional[List[str]]

@@ -24,6 +24,7 @@ def generate(
     friction: Sequence[str] = (),
     batch: bool = False,
     tests: bool = False,
+    contract: bool = False,
     model: Optional[Model] = None,
     scalar: str = "f64",
 ) -> str:
@@ -31,14 +32,15 @@ def generate(
 
     Without ``model`` it is what ``dyngen generate`` writes: ``functions`` of the set ``parameters``, with
     ``values`` baked in where they are given, columns for ``friction`` ("viscous", "coulomb", "tanh:SHAPE"),
-    the module ``batch`` and the arm's own ``tests``. With ``model``, a result of ``identify`` or ``explain``,
+    the module ``batch`` and the arm's own ``tests``; with ``contract`` products are formed within sums (fused
+    multiply-add), for processors that have it. With ``model``, a result of ``identify`` or ``explain``,
     it is what ``powerball generate`` writes: rigid arm, friction and every effect, for the ``scalar`` "f32"
     or "f64"; what a controller cannot make up for is reported as a warning.
     """
     names = None if functions is None else list(functions)
     if model is None:
         baked = None if values is None else arm.set_values(values, parameters=parameters)
-        return _core.generate(arm._core, parameters, names, baked, list(friction), batch, tests)
+        return _core.generate(arm._core, parameters, names, baked, list(friction), batch, tests, contract)
     source, notes = _core.generate_model(arm._core, model_text(model), scalar, names)
     _warn(notes)
     return source

@@ -5,7 +5,7 @@ use super::{Item, Names, comment, documentation, helpers, items};
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::Argument;
 use crate::emit::statement::{is_matrix, is_number};
-use crate::emit::{Options, Parts, docs, rounded};
+use crate::emit::{Options, Parts, docs, fused, rounded};
 use crate::model::{Error, Model};
 
 /// A generated file in CUDA. Compiled without contraction its results are those of the file in C to the bit.
@@ -63,7 +63,7 @@ fn head(names: &Names, model: &Model, options: &Options, rounded: &[String]) -> 
         "behind the other: entry k of state s is at [k * count + s], entries of matrices row by row. The parameters",
         "are one array for all states. A result may be written over an argument of the same length.",
     ];
-    let lines = docs::head_lines(model, options, &needs);
+    let lines = docs::head_lines(model, options, &needs, &fused::CUDA);
     let sizes = format!("Arrays have the lengths that {0}_JOINTS and {0}_PARAMETERS say.", names.upper);
     comment("/*", lines.iter().chain([&sizes]).chain(rounded)) + "\n"
 }

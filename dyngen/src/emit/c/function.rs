@@ -5,7 +5,7 @@ use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::{Argument, Size};
 use crate::emit::docs;
 use crate::emit::lanes::used;
-use crate::emit::statement::{self, is_matrix, is_number};
+use crate::emit::statement::{self, Form, is_matrix, is_number};
 use crate::graph::{Input, Preparation};
 use crate::model::Model;
 use std::collections::BTreeSet;
@@ -139,17 +139,17 @@ fn computed(
         }
         body.extend(read);
     }
-    let signs = statement::signs_of(built, needed);
-    body.extend(SYNTAX.statements(model, &built.graph, needed, &signs));
-    body.extend(results(built, &signs));
+    let form = Form::of(built, needed);
+    body.extend(SYNTAX.statements(model, &built.graph, needed, &form));
+    body.extend(results(built, &form));
     body
 }
 
 /// The lines that write the result.
-fn results(built: &FunctionGraph, signs: &[bool]) -> Vec<String> {
+fn results(built: &FunctionGraph, form: &Form) -> Vec<String> {
     let columns = built.shape.1;
     let line = |entry: usize| {
-        let (is_negative, name) = statement::result(built, signs, entry);
+        let (is_negative, name) = statement::result(built, form, entry);
         let sign = if is_negative { "-" } else { "" };
         let (i, j) = (entry / columns, entry % columns);
         match () {
@@ -167,8 +167,7 @@ pub(super) fn prepare(names: &Names, model: &Model, preparation: &Preparation) -
     let graph = preparation.graph();
     let needed = graph.needed(preparation.values());
     let mut body = SYNTAX.of_parameters(&graph, &needed);
-    let signs = vec![false; graph.nodes().len()];
-    body.extend(SYNTAX.statements(model, &graph, &needed, &signs));
+    body.extend(SYNTAX.statements(model, &graph, &needed, &Form::plain(&graph)));
     let values = preparation.values().iter().enumerate();
     body.extend(
         values.map(|(k, e)| format!("prepared->values[{k}] = {};", statement::value_name(&graph, e.node()))),

@@ -10,7 +10,7 @@ pub use cuda::cuda_source;
 
 use super::names::Names;
 use super::syntax::Syntax;
-use super::{Options, Parts, docs, rounded};
+use super::{Options, Parts, docs, fused, rounded};
 use crate::arm::JointKind;
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::{Argument, Size};
@@ -36,12 +36,13 @@ pub fn c_files(model: &Model, options: &Options, header: &str) -> Result<CFiles,
     let parts = Parts::new(model, options)?;
     let names = Names::new(&model.arm().name);
     let items = items(&names, model, options, &parts, None);
+    let condition = if options.contract { fused::CONDITION } else { "" };
     let head = |rounded: &[String]| head(&names, model, options, rounded);
     Ok(CFiles {
         header: names.header(&head(&[]), &items),
         source: names.source(
             &head(&rounded::lines(model, &parts)),
-            &helpers(&names, model, options),
+            &(condition.to_string() + &helpers(&names, model, options)),
             header,
             &items,
         ),
@@ -207,7 +208,8 @@ fn head(names: &Names, model: &Model, options: &Options, rounded: &[String]) -> 
         "Every function is proven equal to the Lagrangian of the arm; none allocates. A result may be written over an",
         "argument. Matrices are arrays of rows: result[i][j].",
     ];
-    let lines = docs::head_lines(model, options, &needs);
+    let contracted = fused::C.map(|line| line.replace("NAME", upper));
+    let lines = docs::head_lines(model, options, &needs, &contracted.each_ref().map(String::as_str));
     let sizes = format!("Arrays have the lengths that {upper}_JOINTS and {upper}_PARAMETERS say.");
     comment(
         "/*",
@@ -236,10 +238,11 @@ fn helpers(names: &Names, model: &Model, options: &Options) -> String {
     let friction = friction::helpers(&options.friction);
     let parts = [trigonometry, &friction]
         .map(|text| if text.is_empty() { String::new() } else { format!("{text}\n") });
-    parts.concat().replace("NAME", &names.upper)
+    let fused = if options.contract { fused::IN_C } else { "" };
+    (fused.to_string() + &parts.concat()).replace("NAME", &names.upper)
 }
 
-const SYNTAX: Syntax = Syntax { value: "const real", field: "->", number };
+const SYNTAX: Syntax = Syntax { value: "const real", field: "->", number, fused: "fused" };
 
 /// A number: rounded to double, then to the file's numbers, as in Rust.
 fn number(x: f64) -> String {

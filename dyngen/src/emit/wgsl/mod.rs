@@ -6,16 +6,16 @@ mod entry;
 use super::angles::{all_inputs, shifted_docs, sum_docs, turns};
 use super::lanes::used;
 use super::names::Names;
-use super::statement::{self, is_matrix, is_number};
+use super::statement::{self, Form, is_matrix, is_number};
 use super::syntax::Syntax;
-use super::{Options, Parts, docs, rounded};
+use super::{Options, Parts, docs, fused, rounded};
 use crate::arm::JointKind;
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::Argument;
 use crate::graph::Input;
 use crate::model::{Error, Model};
 
-const SYNTAX: Syntax = Syntax { value: "let", field: ".", number };
+const SYNTAX: Syntax = Syntax { value: "let", field: ".", number, fused: "fma" };
 
 /// A number: its digits are those of the file in Rust.
 fn number(x: f64) -> String {
@@ -55,7 +55,7 @@ fn head(model: &Model, options: &Options, rounded: &[String]) -> String {
         "Arrays over count states are one behind the other: entry k of state s is at [k * count + s]. The parameters",
         "are one array for all states. An entry point needs the bindings that its comment names and no other.",
     ];
-    comment(docs::head_lines(model, options, &needs).iter().chain(rounded).map(String::as_str))
+    comment(docs::head_lines(model, options, &needs, &fused::WGSL).iter().chain(rounded).map(String::as_str))
 }
 
 /// Lines as comments.
@@ -160,8 +160,8 @@ fn prepare(names: &Names, model: &Model, parts: &Parts<'_>) -> String {
     let preparation = &parts.preparation;
     let graph = preparation.graph();
     let needed = graph.needed(preparation.values());
-    let signs = vec![false; graph.nodes().len()];
-    let lines = [SYNTAX.of_parameters(&graph, &needed), SYNTAX.statements(model, &graph, &needed, &signs)];
+    let form = Form::plain(&graph);
+    let lines = [SYNTAX.of_parameters(&graph, &needed), SYNTAX.statements(model, &graph, &needed, &form)];
     let body: String = lines.concat().iter().map(|line| format!("    {line}\n")).collect();
     let mut values: Vec<String> =
         preparation.values().iter().map(|e| statement::value_name(&graph, e.node())).collect();
@@ -211,12 +211,12 @@ fn functions(
     });
     let with: Vec<String> = std::iter::once(format!("trig: {prefix}_trig")).chain(with).collect();
     let plain: Vec<String> = [Argument::Positions].iter().chain(&others).map(typed).collect();
-    let signs = statement::signs_of(built, &needed);
+    let form = Form::of(built, &needed);
     let mut body = SYNTAX.of_trig(model, &used);
     for argument in &others {
         body.extend(SYNTAX.of_argument(built, *argument, parts.preparation.values().len(), &used));
     }
-    body.extend(SYNTAX.statements(model, &built.graph, &needed, &signs));
+    body.extend(SYNTAX.statements(model, &built.graph, &needed, &form));
     let body: String = body.iter().map(|line| format!("    {line}\n")).collect();
     let passed = others.iter().map(|a| match a {
         Argument::Parameters => format!(", {prefix}_prepare(parameters)"),
@@ -227,7 +227,7 @@ fn functions(
             "{}fn {name}_with({}) -> {result} {{\n{body}    return {};\n}}\n",
             documentation(&format!("{name} of what was made of its arguments once.")),
             with.join(", "),
-            value(built, &signs)
+            value(built, &form)
         ),
         format!(
             "{}fn {name}({}) -> {result} {{\n    return {name}_with({prefix}_trig_of(q){});\n}}\n",
@@ -252,9 +252,9 @@ fn result(built: &FunctionGraph) -> String {
 }
 
 /// A function's result.
-fn value(built: &FunctionGraph, signs: &[bool]) -> String {
+fn value(built: &FunctionGraph, form: &Form) -> String {
     let mut entries = (0..built.outputs.len()).map(|entry| {
-        let (is_negative, name) = statement::result(built, signs, entry);
+        let (is_negative, name) = statement::result(built, form, entry);
         if is_negative { format!("-{name}") } else { name }
     });
     match is_number(built) {

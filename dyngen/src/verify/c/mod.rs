@@ -32,6 +32,27 @@ const BEFORE: &str = r#"
 #pragma STDC FP_CONTRACT OFF
 #endif
 "#;
+/// On which targets a file with contraction compiles.
+const CONDITION: &str = r#"
+#ifndef NAME_FMA
+#ifdef NAME_FLOAT
+#if !(defined(__FP_FAST_FMAF) || defined(__FMA__) || defined(__ARM_FEATURE_FMA))
+#error "generated with --contract, and the target has no fused multiply-add: compile with -march=native or -mfma"
+#endif
+#elif !(defined(__FP_FAST_FMA) || defined(__FMA__) || defined(__aarch64__))
+#error "generated with --contract, and the target has no fused multiply-add: compile with -march=native or -mfma"
+#endif
+#endif
+"#;
+/// What gives x·y + z there.
+const FUSED: &str = "
+#undef fused
+#ifdef NAME_FLOAT
+#define fused(x, y, z) fmaf(x, y, z)
+#else
+#define fused(x, y, z) fma(x, y, z)
+#endif
+";
 /// Sines and cosines, tested where they are written.
 const TRIGONOMETRY: &str = include_str!("../../emit/c/trigonometry.c");
 
@@ -84,9 +105,23 @@ impl Reader<'_> {
         self.text.expect("typedef")?;
         self.prefix = self.text.next().trim_end_matches("real").to_string();
         self.text.expect("real ;")?;
+        let upper = self.upper();
+        if self.text.peek().is_some_and(|token| token == format!("#ifndef {upper}_FMA")) {
+            self.text.text(&CONDITION.replace("NAME", &upper), OTHER)?;
+        }
+        self.fused()?;
         // An arm whose joints all slide has no sines.
         if self.text.peek().is_some_and(|token| token.starts_with('#')) {
             self.text.text(&TRIGONOMETRY.replace("NAME", &self.upper()), OTHER)?;
+        }
+        Ok(())
+    }
+
+    /// The function that gives x·y + z, where the file has it.
+    fn fused(&mut self) -> Checked<()> {
+        if self.text.peek() == Some("#undef fused") {
+            self.text.text(&FUSED.replace("NAME", &self.upper()), OTHER)?;
+            self.text.fused = "fused";
         }
         Ok(())
     }
