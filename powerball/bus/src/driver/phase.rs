@@ -69,11 +69,6 @@ impl Phase {
             Phase::Resetting => "resets faults",
         }
     }
-
-    /// Whether the joints may have torque on the driver's command.
-    pub(super) const fn is_live(self) -> bool {
-        matches!(self, Phase::Enabling | Phase::Running)
-    }
 }
 
 impl fmt::Display for Phase {

@@ -23,41 +23,42 @@ impl<const N: usize> Driver<N> {
         if matches!(self.stage, Stage::Idle) || self.latch.silent {
             return;
         }
+        let found = self.take(frame, tx);
+        self.act(found, tx);
+        self.check_queue(tx);
+    }
+
+    fn take(&mut self, frame: &Frame, tx: &mut impl Transmit) -> Option<Cause> {
         if let Some(foreign) = self.foreign(frame) {
             // An arm that is stopped already is reported once.
             let known = self.stage.is_stopped() && matches!(self.latch.cause(), Some(Cause::OtherMaster(_)));
-            self.act((!known).then_some(Cause::OtherMaster(foreign)), tx);
-            return;
+            return (!known).then_some(Cause::OtherMaster(foreign));
         }
-        if matches!(self.stage, Stage::Listening { .. }) {
-            return;
-        }
-        let cob = Cob::of(frame);
-        let Some(Cob::Tpdo(_, node) | Cob::Emcy(node) | Cob::SdoResponse(node) | Cob::Heartbeat(node)) = cob
+        let cob = Cob::of(frame)?;
+        let (Cob::Tpdo(_, node) | Cob::Emcy(node) | Cob::SdoResponse(node) | Cob::Heartbeat(node)) = cob
         else {
-            return;
+            return None;
         };
+        if matches!(self.stage, Stage::Listening { .. }) {
+            return None;
+        }
         let Some(j) = self.arm.joint_of(node) else {
             self.arm.counters.unexpected += 1;
-            return;
+            return None;
         };
-        let found = match cob {
-            Some(Cob::Tpdo(number, _)) => {
-                self.process_data(j, number, frame, tx);
-                None
-            }
-            Some(Cob::Heartbeat(_)) => match nmt::State::decode(frame) {
-                Some((_, state)) => self.heartbeat(j, state),
-                None => self.malformed(j),
+        match cob {
+            Cob::Tpdo(number, _) => self.process_data(j, number, frame, tx),
+            Cob::Heartbeat(_) => match nmt::State::decode(frame) {
+                Some((_, state)) => return self.heartbeat(j, state),
+                None => self.arm.joints.get_mut(j)?.counters.malformed += 1,
             },
-            Some(Cob::Emcy(_)) => match Emcy::decode(frame) {
-                Some((_, emcy)) => self.emergency(j, emcy),
-                None => self.malformed(j),
+            Cob::Emcy(_) => match Emcy::decode(frame) {
+                Some((_, emcy)) => return self.emergency(j, emcy),
+                None => self.arm.joints.get_mut(j)?.counters.malformed += 1,
             },
-            _ => self.answer(j, frame, tx),
-        };
-        self.act(found, tx);
-        self.check_queue(tx);
+            _ => return self.answer(j, frame, tx),
+        }
+        None
     }
 
     /// Whether `frame` is one that only a master sends. A transport does not return frames that this end has
@@ -70,11 +71,6 @@ impl<const N: usize> Driver<N> {
             Cob::Heartbeat(node) if node == self.arm.profile.master => Some(Foreign::Heartbeat(node)),
             _ => None,
         }
-    }
-
-    fn malformed(&mut self, j: usize) -> Option<Cause> {
-        self.arm.joints.get_mut(j)?.counters.malformed += 1;
-        None
     }
 
     fn process_data(&mut self, j: usize, number: u8, frame: &Frame, tx: &mut impl Transmit) {
@@ -96,7 +92,7 @@ impl<const N: usize> Driver<N> {
             (velocity, |driver, j| {
                 if driver.follows_currents() { driver.torque.gate_velocity(&mut driver.arm, j) } else { None }
             }),
-            (position, |driver, j| driver.watch.jump(&driver.arm, driver.stage.phase(), j)),
+            (position, |driver, j| driver.watch.jump(&driver.arm, driver.stage.is_up(), j)),
             (joint.presence.is_whole(all), |driver, j| {
                 let at = driver.raster.synced_at();
                 if driver.follows_currents() { driver.torque.slip(&driver.arm, at, j) } else { None }
@@ -107,7 +103,12 @@ impl<const N: usize> Driver<N> {
                 driver.watch.status(&mut driver.arm, running, released, j)
             }),
             (mode, |driver, j| driver.stage.wrong_mode(&driver.arm, j)),
-            (velocity, |driver, j| driver.watch.speed(&driver.arm, driver.stage.phase(), j)),
+            (
+                velocity,
+                |driver, j| {
+                    if driver.stage.is_live() { driver.watch.speed(&driver.arm, j) } else { None }
+                },
+            ),
         ];
         for (due, check) in checks {
             if due {

@@ -52,6 +52,11 @@ impl<const N: usize> Stage<N> {
         matches!(self, Stage::Enabling(_) | Stage::Running(_))
     }
 
+    /// Whether the joints are configured and may be enabled, or are.
+    pub(super) const fn is_up(&self) -> bool {
+        self.is_live() || matches!(self, Stage::Ready)
+    }
+
     pub(super) const fn is_running(&self) -> bool {
         matches!(self, Stage::Running(_))
     }
@@ -105,6 +110,6 @@ impl<const N: usize> Stage<N> {
     /// Each mode display of joint `j`: whether the drive is in another mode, where it must be in the arm's.
     pub(super) fn wrong_mode(&self, arm: &Arm<N>, j: usize) -> Option<Cause> {
         let mode = arm.joints.get(j)?.mode.filter(|mode| *mode != arm.mode().mode)?;
-        (self.is_live() || matches!(self, Stage::Ready)).then_some(Cause::WrongMode(arm.node(j), mode))
+        self.is_up().then_some(Cause::WrongMode(arm.node(j), mode))
     }
 }

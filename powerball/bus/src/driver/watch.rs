@@ -7,7 +7,6 @@
 use super::arm::Arm;
 use super::cause::{Cause, Hindrance};
 use super::demand::ControlMode;
-use super::phase::Phase;
 use super::presence::run;
 use crate::canopen::Micros;
 use crate::cia402::{State, Statusword};
@@ -65,8 +64,9 @@ impl<const N: usize> Watch<N> {
         }
     }
 
-    /// Each position: an encoder that jumps is not a measurement.
-    pub(super) fn jump(&mut self, arm: &Arm<N>, phase: Phase, j: usize) -> Option<Cause> {
+    /// Each position: an encoder that jumps is not a measurement. It is `judged` where the joint may have torque, or
+    /// soon.
+    pub(super) fn jump(&mut self, arm: &Arm<N>, judged: bool, j: usize) -> Option<Cause> {
         let (reactions, period) = (&arm.profile.reactions, arm.profile.sync_period);
         let (profile, position) = (arm.profile.joints.get(j)?, arm.joints.get(j)?.position);
         let (before, at) = self.joints.get_mut(j)?.seen.replace((position, arm.now))?;
@@ -74,23 +74,16 @@ impl<const N: usize> Watch<N> {
         let time = (arm.elapsed(at) + period) as f64 * 1e-6;
         let most = profile.velocity * reactions.overspeed_factor * time + reactions.jump_margin;
         let step = position - before;
-        (step.abs() > most && (phase.is_live() || phase == Phase::Ready)).then_some(Cause::PositionJump(
-            profile.node,
-            step,
-            most,
-        ))
+        (judged && step.abs() > most).then_some(Cause::PositionJump(profile.node, step, most))
     }
 
     /// Each velocity, while the joints may have torque.
-    pub(super) fn speed(&mut self, arm: &Arm<N>, phase: Phase, j: usize) -> Option<Cause> {
+    pub(super) fn speed(&mut self, arm: &Arm<N>, j: usize) -> Option<Cause> {
         let reactions = &arm.profile.reactions;
         let (factor, cycles) = match arm.control {
             ControlMode::Current => (reactions.torque_mode.overspeed_factor, reactions.torque_mode.cycles),
             _ => (reactions.overspeed_factor, reactions.missing_cycles),
         };
-        if !phase.is_live() {
-            return None;
-        }
         let (velocity, most) = (arm.joints.get(j)?.velocity, arm.profile.joints.get(j)?.velocity * factor);
         let (fast, allowed) = (&mut self.joints.get_mut(j)?.fast, velocity.abs() <= most);
         if !run(fast, !allowed, cycles.max(1)) {
