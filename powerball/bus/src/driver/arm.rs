@@ -1,5 +1,5 @@
-//! The arm as the phases and the watches see it: its profile and mode, its joints, the time, and the way to the
-//! bus. Nothing here decides anything.
+//! The arm as the phases and the watches see it: its profile and mode, its joints, the time, and the way to
+//! the bus. Nothing here decides anything.
 
 use super::budget::Budget;
 use super::cause::{Cause, Refusal};
@@ -110,8 +110,8 @@ impl<const N: usize> Arm<N> {
         sent
     }
 
-    /// A command of network management to each node of the arm, and to no other device on the bus; whether all
-    /// of them could be queued.
+    /// A command of network management to each node of the arm, and to no other device on the bus; whether
+    /// all of them could be queued.
     pub(super) fn manage(&mut self, command: nmt::Command, tx: &mut impl Transmit) -> bool {
         let mut all = true;
         for j in 0..N {

@@ -64,7 +64,7 @@ impl<const N: usize> Driver<N> {
         if self.heartbeat.poll(now) {
             self.arm.send(nmt::State::Operational.frame(self.arm.profile.master), tx);
         }
-        // A frame that leaves when SYNC is due could be overtaken by it and meet the next one in the same cycle.
+        // A frame that leaves when SYNC is due could be overtaken by it, and meet the next one in one cycle.
         let due = |at: Option<Micros>| at.is_some_and(|at| now >= at);
         if due(self.setpoints_due()) && !due(self.raster.next()) {
             self.raster.close();

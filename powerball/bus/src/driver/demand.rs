@@ -97,8 +97,8 @@ impl Demand {
         next.max(low.min(last)).min(high.max(last))
     }
 
-    /// How far `actual` is from where a drive with any delay up to [`KEPT`] cycles would be: from the range of the
-    /// last set-points. 0 within it, negative below it.
+    /// How far `actual` is from where a drive with any delay up to [`KEPT`] cycles would be: from the range
+    /// of the last set-points. 0 within it, negative below it.
     pub(super) fn error(&self, actual: f64) -> f64 {
         let low = self.points.iter().copied().fold(f64::INFINITY, f64::min);
         let high = self.points.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -118,8 +118,8 @@ mod tests {
 
     const WIDE: [f64; 2] = [-10.0, 10.0];
 
-    /// Without any new set-point a joint that is on its way to the end of its range comes to rest before it, and never
-    /// brakes harder than it may.
+    /// Without any new set-point a joint that is on its way to the end of its range comes to rest before it,
+    /// and never brakes harder than it may.
     #[test]
     fn what_goes_on_comes_to_rest_within_its_range() {
         let (period, acceleration) = (0.005, 4.0);

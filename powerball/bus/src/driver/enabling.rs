@@ -39,8 +39,8 @@ impl<const N: usize> Enabling<N> {
         !matches!(self.joints.get(j), None | Some(Progress::Waiting | Progress::Walking { .. }))
     }
 
-    /// Whether the drive of joint `j` may be in this state. Where a walking joint should be is judged where it
-    /// walks.
+    /// Whether the drive of joint `j` may be in this state. Where a walking joint should be is judged where
+    /// it walks.
     pub(super) fn allows(&self, j: usize, state: State) -> bool {
         match self.joints.get(j) {
             Some(Progress::Waiting) => !state.has_torque(),

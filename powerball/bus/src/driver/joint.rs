@@ -130,8 +130,8 @@ impl Joint {
         self.state().is_some_and(|state| !state.has_torque())
     }
 
-    /// Stores the process data of transmit PDO `number`, which came at `now` in `cycle`; returns false if it does
-    /// not fit the mapping.
+    /// Stores the process data of transmit PDO `number`, which came at `now` in `cycle`; returns false if it
+    /// does not fit the mapping.
     pub(super) fn update(
         &mut self,
         number: u8,

@@ -1,5 +1,5 @@
-//! What was latched: why the arm was stopped, and what must come before it moves again. Written where a cause is
-//! acted on, and by the caller's acknowledgement.
+//! What was latched: why the arm was stopped, and what must come before it moves again. Written where a cause
+//! is acted on, and by the caller's acknowledgement.
 
 use super::cause::{Cause, Details};
 

@@ -345,8 +345,8 @@ impl<const N: usize> Driver<N> {
         self.raster.slot(self.arm.budget.setpoint_slot())
     }
 
-    /// Positions (rad) and velocities (rad/s) of the joints at the last SYNC. What has not come yet is carried on with the
-    /// last velocity; the second array says for how many cycles.
+    /// Positions (rad) and velocities (rad/s) of the joints at the last SYNC. What has not come yet is
+    /// carried on with the last velocity; the second array says for how many cycles.
     pub fn state(&self) -> ([[f64; N]; 2], [u64; N]) {
         let (now, period) = (self.arm.counters.cycles, self.arm.profile.period_seconds());
         let position = self.arm.joints.each_ref().map(|joint| {

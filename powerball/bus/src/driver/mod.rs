@@ -55,8 +55,8 @@
 //!
 //! # Files
 //!
-//! In the order in which they may use each other: each uses those above it. What checks something says what it
-//! has found; one place, in `machine`, acts on it.
+//! In the order in which they may use each other: each uses those above it. What checks something says what
+//! it has found; one place, in `machine`, acts on it.
 //!
 //! | file | contents |
 //! |---|---|

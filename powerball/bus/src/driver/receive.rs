@@ -134,7 +134,8 @@ impl<const N: usize> Driver<N> {
                 _ => Some(Cause::Rebooted(node)),
             };
         }
-        // A heartbeat from before the start may have waited behind everything else: its priority is the lowest.
+        // A heartbeat from before the start may have waited behind everything else: its priority is the
+        // lowest.
         let judged = self.raster.is_running() && !matches!(self.stage, Stage::Starting { .. });
         let was = before == Some(nmt::State::Operational);
         (state != nmt::State::Operational && was && judged).then_some(Cause::NotOperational(node))

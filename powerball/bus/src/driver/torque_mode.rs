@@ -61,7 +61,8 @@ struct Guarded {
     tracking: u8,
 }
 
-/// How the torque of a joint fits its motion, N·m: what acted less what the model needs, and how much that may be.
+/// How the torque of a joint fits its motion, N·m: what acted less what the model needs, and how much that
+/// may be.
 #[derive(Clone, Copy, Debug, Default)]
 struct Left {
     left: f64,
@@ -112,8 +113,8 @@ impl Guarded {
     }
 }
 
-/// The guard of current mode of all joints. It is asked while the arm follows currents; each check says what is
-/// wrong, and does nothing about it.
+/// The guard of current mode of all joints. It is asked while the arm follows currents; each check says what
+/// is wrong, and does nothing about it.
 #[derive(Clone, Debug)]
 pub(super) struct TorqueWatch<const N: usize> {
     joints: [Guarded; N],
@@ -161,8 +162,8 @@ impl<const N: usize> TorqueWatch<N> {
         Some(Cause::PositionAgainstVelocity(profile.node, JointNumber::from_index(j), slip))
     }
 
-    /// Once a cycle: finds the joint with the largest torque error, among those whose error was too large for too
-    /// long.
+    /// Once a cycle: finds the joint with the largest torque error, among those whose error was too large for
+    /// too long.
     pub(super) fn torque_error(&mut self, arm: &Arm<N>) -> Option<Cause> {
         let limit = arm.profile.reactions.torque_mode.cycles;
         let left = self.torque_left(arm)?;
@@ -179,8 +180,8 @@ impl<const N: usize> TorqueWatch<N> {
         Some(Cause::TorqueError(arm.node(j), JointNumber::from_index(j), left, tolerance))
     }
 
-    /// How the torque that acted fits the motion that was measured. Nothing where there is no model, or data was
-    /// missing.
+    /// How the torque that acted fits the motion that was measured. Nothing where there is no model, or data
+    /// was missing.
     fn torque_left(&mut self, arm: &Arm<N>) -> Option<[Left; N]> {
         for (guarded, joint) in self.joints.iter_mut().zip(&arm.joints) {
             guarded.acted.rotate_right(1);
@@ -270,7 +271,8 @@ impl<const N: usize> TorqueGuard<N> {
         of(self.torque(q, &rest, &unit)) - of(self.torque(q, &rest, &rest))
     }
 
-    /// Friction at a velocity: what of the torque without acceleration turns with it, N·m. Gravity and Coriolis forces do not.
+    /// Friction at a velocity: what of the torque without acceleration turns with it, N·m. Gravity and
+    /// Coriolis forces do not.
     fn friction(&self, q: &[f64; N], dq: &[f64; N]) -> [f64; N] {
         let forth = self.torque(q, dq, &[0.0; N]);
         let back = self.torque(q, &dq.map(|v| -v), &[0.0; N]);

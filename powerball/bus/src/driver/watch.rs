@@ -1,6 +1,6 @@
 //! The watch on the motion of the joints: following error, velocity error, standstill, jumps, limits, speed,
-//! torque, and the bits of the statusword other than its state. The master watches always, whatever the drives
-//! watch themselves.
+//! torque, and the bits of the statusword other than its state. The master watches always, whatever the
+//! drives watch themselves.
 //!
 //! Each check is of one joint; it says what is wrong, and does nothing about it.
 
@@ -64,8 +64,8 @@ impl<const N: usize> Watch<N> {
         }
     }
 
-    /// Each position: an encoder that jumps is not a measurement. It is `judged` where the joint may have torque, or
-    /// soon.
+    /// Each position: an encoder that jumps is not a measurement. It is `judged` where the joint may have
+    /// torque, or soon.
     pub(super) fn jump(&mut self, arm: &Arm<N>, judged: bool, j: usize) -> Option<Cause> {
         let (reactions, period) = (&arm.profile.reactions, arm.profile.sync_period);
         let (profile, position) = (arm.profile.joints.get(j)?, arm.joints.get(j)?.position);
@@ -132,9 +132,9 @@ impl<const N: usize> Watch<N> {
         Some(Cause::Hindered(node, hindrance, status))
     }
 
-    /// Each cycle in velocity mode: compares the commanded travel with the measured one. A joint that is slow to
-    /// follow has no large velocity error. As long as the scale of velocities was not verified on hardware,
-    /// each move verifies it too: two readings of 0x604C are the inverse of each other.
+    /// Each cycle in velocity mode: compares the commanded travel with the measured one. A joint that is slow
+    /// to follow has no large velocity error. As long as the scale of velocities was not verified on
+    /// hardware, each move verifies it too: two readings of 0x604C are the inverse of each other.
     pub(super) fn travel(&mut self, arm: &Arm<N>, j: usize) -> Option<Cause> {
         let (joint, watched) = (arm.joints.get(j)?, self.joints.get_mut(j)?);
         if arm.control != ControlMode::Velocity {
