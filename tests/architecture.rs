@@ -212,34 +212,42 @@ fn folders_do_not_use_each_other_in_a_circle() {
     assert!(circles.is_empty(), "each of these arrows is part of a circle:\n{}", circles.join("\n"));
 }
 
-/// The table of `explain/mod.rs` says who decides what in which order, and that nothing uses what stands below it.
-#[test]
-fn an_explanation_runs_in_the_order_of_its_table() {
-    let folder = root().join("powerball/explanation/src/explain");
-    let page = fs::read_to_string(folder.join("mod.rs")).unwrap();
+/// What stands below itself in the table of a folder's `mod.rs`, which gives its files in the order in which they may
+/// use each other.
+fn against_the_table(crate_source: &str, folder: &str) -> BTreeSet<String> {
+    let source = root().join(crate_source);
+    let page = fs::read_to_string(source.join(folder).join("mod.rs")).unwrap();
     let rows = page.lines().filter_map(|line| line.strip_prefix("//! |")?.split('|').next());
     let order: Vec<String> =
         rows.flat_map(|cell| cell.split('`').skip(1).step_by(2)).map(str::to_string).collect();
+    assert!(order.len() > 5, "{folder}/mod.rs has no table of its files: {order:?}");
     let mut wrong = BTreeSet::new();
-    for file in sources(&folder) {
-        let Some(own) = module(&folder, &file).filter(|own| !own.is_empty()) else { continue };
-        let Some(here) = order.iter().position(|name| *name == own[0]) else {
-            wrong.insert(format!("{} has no row", own[0]));
+    for file in sources(&source.join(folder)) {
+        let Some(own) = module(&source, &file).filter(|own| own.len() > 1) else { continue };
+        let Some(here) = order.iter().position(|name| *name == own[1]) else {
+            wrong.insert(format!("{folder}/{} has no row", own[1]));
             continue;
         };
         let parent = if file.ends_with("mod.rs") { &own[..] } else { &own[..own.len() - 1] };
         for path in used(&code(&file), parent) {
-            let there = path.first().and_then(|name| order.iter().position(|other| other == name));
-            if let Some(there) = there.filter(|there| *there > here) {
+            let there =
+                (path[0] == folder).then(|| order.iter().position(|other| path.get(1) == Some(other)));
+            if let Some(there) = there.flatten().filter(|there| *there > here) {
                 wrong.insert(format!("{} uses {}, which stands below it", own.join("/"), order[there]));
+            } else if there == Some(None) && path.len() == 2 {
+                wrong.insert(format!("{} uses {} of mod.rs: name its file", own.join("/"), path[1]));
             }
         }
     }
-    assert!(
-        order.len() > 5 && wrong.is_empty(),
-        "{order:?}:\n{}",
-        wrong.into_iter().collect::<Vec<_>>().join("\n")
-    );
+    wrong
+}
+
+#[test]
+fn files_use_what_stands_above_them_in_the_table_of_their_folder() {
+    let folders = [("powerball/explanation/src", "explain"), ("powerball/bus/src", "driver")];
+    let wrong: Vec<String> =
+        folders.iter().flat_map(|(source, name)| against_the_table(source, name)).collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[test]

@@ -1,20 +1,15 @@
-//! From silence to following set-points: boot, scripts, first data, enabling, commutation.
+//! From silence to process data: the nodes boot, are identified, configured and verified.
 
+use super::arm::{Arm, is_off};
 use super::budget::worst_bits;
-use super::cause::Hindrance;
-use super::script::{Progress, Write, configuration, questions};
-use super::{Cause, Driver, Phase, Transmit};
+use super::cause::{Cause, Hindrance};
+use super::joint::Transmit;
+use super::script::{Write, configuration, questions};
 use crate::canopen::client::{SdoError, Value};
 use crate::canopen::objects::{DEVICE_TYPE, PRODUCT_CODE, REVISION, SERIAL_NUMBER, VENDOR_ID};
 use crate::canopen::sdo::AbortCode;
 use crate::canopen::{Frame, Micros, Object, nmt};
-use crate::cia402::{State, objects, schunk};
-
-/// How often the nodes were reset since the start.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct BringUp {
-    resets: u8,
-}
+use crate::cia402::{State, objects};
 
 /// The device profile of drives, CiA 402: the low 16 bits of 0x1000.
 const DRIVES: u32 = 402;
@@ -22,282 +17,240 @@ const DRIVES: u32 = 402;
 /// A node that does not boot is reset once more: supplies come late.
 const RESETS: u8 = 2;
 
-impl<const N: usize> Driver<N> {
-    pub(super) fn poll_boot(&mut self, tx: &mut impl Transmit) {
-        if self.bring_up.resets == 0 {
-            self.sync.stop();
-            self.slot_open = false;
-            for joint in &mut self.joints {
+/// The nodes are reset; their boot-up messages are awaited.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Boot {
+    /// How often they were reset.
+    resets: u8,
+    /// When last.
+    since: Micros,
+}
+
+impl Boot {
+    pub(super) const fn new(now: Micros) -> Boot {
+        Boot { resets: 0, since: now }
+    }
+
+    /// Whether nothing was reset yet.
+    pub(super) const fn is_first(&self) -> bool {
+        self.resets == 0
+    }
+
+    /// Takes the nodes further; true when all have booted.
+    ///
+    /// # Errors
+    /// The cause, where one of them does not boot.
+    pub(super) fn poll<const N: usize>(
+        &mut self,
+        arm: &mut Arm<N>,
+        tx: &mut impl Transmit,
+    ) -> Result<bool, Cause> {
+        if self.is_first() {
+            for joint in &mut arm.joints {
                 joint.client.cancel();
-                joint.heartbeat.stop();
+                joint.presence.release();
                 (joint.booted, joint.status, joint.mode, joint.emergency) = (None, None, None, None);
                 (joint.current_limit, joint.declined) = (None, 0);
             }
-            if self.manage(nmt::Command::ResetNode, tx) {
-                self.bring_up.resets = 1;
-                self.enter(Phase::Boot);
+            if arm.manage(nmt::Command::ResetNode, tx) {
+                *self = Boot { resets: 1, since: arm.now };
             }
-            return;
+            return Ok(false);
         }
-        let Some(missing) = self.joints.iter().position(|joint| joint.booted.is_none()) else {
+        let Some(missing) = arm.joints.iter().position(|joint| joint.booted.is_none()) else {
             // Nodes go there by themselves after their boot-up; some (python-canopen's) repeat it until they
             // are commanded.
-            if self.manage(nmt::Command::EnterPreOperational, tx) {
-                self.enter_script(Phase::Identify, tx);
-            }
-            return;
+            return Ok(arm.manage(nmt::Command::EnterPreOperational, tx));
         };
-        if self.elapsed() < self.profile.reactions.boot_timeout {
-            return;
+        if arm.elapsed(self.since) < arm.profile.reactions.boot_timeout {
+            return Ok(false);
         }
-        if self.bring_up.resets >= RESETS {
+        let asleep = |arm: &Arm<N>, j: usize| arm.joints.get(j).is_some_and(|joint| joint.booted.is_none());
+        if self.resets >= RESETS {
             for j in missing + 1..N {
-                if self.joints.get(j).is_some_and(|joint| joint.booted.is_none()) {
-                    self.note(Cause::NoBoot(self.node(j)));
+                if asleep(arm, j) {
+                    arm.note(Cause::NoBoot(arm.node(j)));
                 }
             }
-            self.trip(Cause::NoBoot(self.node(missing)), tx);
-            return;
+            return Err(Cause::NoBoot(arm.node(missing)));
         }
-        self.bring_up.resets += 1;
-        self.enter(Phase::Boot);
+        *self = Boot { resets: self.resets + 1, since: arm.now };
         for j in 0..N {
-            if self.joints.get(j).is_some_and(|joint| joint.booted.is_none()) {
-                self.send(nmt::Command::ResetNode.frame(Some(self.node(j))), tx);
+            if asleep(arm, j) {
+                arm.send(nmt::Command::ResetNode.frame(Some(arm.node(j))), tx);
             }
         }
+        Ok(false)
+    }
+}
+
+/// The scripts, in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Script {
+    /// Who the nodes are and what they offer is read.
+    Identify,
+    /// They are configured.
+    Configure,
+    /// The configuration is read back.
+    Verify,
+}
+
+/// How far a joint is in its script.
+#[derive(Clone, Copy, Debug, Default)]
+struct Place {
+    step: usize,
+    retries: u8,
+    /// Earliest time of the next step.
+    next: Micros,
+}
+
+/// The scripts of all joints, side by side.
+#[derive(Clone, Debug)]
+pub(super) struct Scripts<const N: usize> {
+    pub(super) script: Script,
+    places: [Place; N],
+}
+
+impl<const N: usize> Scripts<N> {
+    pub(super) fn new() -> Self {
+        Scripts { script: Script::Identify, places: [Place::default(); N] }
     }
 
-    fn enter_script(&mut self, phase: Phase, tx: &mut impl Transmit) {
-        self.enter(phase);
-        self.joints.iter_mut().for_each(|joint| (joint.step, joint.retries) = (0, 0));
-        self.poll_scripts(tx);
-    }
-
-    /// Between two steps of one joint: as long as a round of all joints takes, and half of that again.
-    /// Transfers without a pause would fill the bus, and the master's heartbeat, lowest in priority, would be
-    /// missed by the drives.
-    fn sdo_pause(&self) -> Micros {
-        let round_trip = self.budget.duration(2 * worst_bits(8));
-        round_trip * N as u64 * 3 / 2
+    /// When the next step of an idle joint is due, after now.
+    pub(super) fn due(&self, arm: &Arm<N>) -> Option<Micros> {
+        let idle = self.places.iter().zip(&arm.joints).filter(|(_, joint)| joint.client.is_idle());
+        idle.map(|(place, _)| place.next).filter(|next| *next > arm.now).min()
     }
 
     /// The write that joint `j` is at, while configuring and verifying.
-    fn write_of(&self, j: usize, step: usize) -> Option<Write> {
-        let verifying = self.phase == Phase::Verify;
-        let declined = self.joints.get(j).map_or(0, |joint| joint.declined);
+    fn write_of(&self, arm: &Arm<N>, j: usize) -> Option<Write> {
+        let step = self.places.get(j)?.step;
+        let verifying = self.script == Script::Verify;
+        let declined = arm.joints.get(j).map_or(0, |joint| joint.declined);
         let kept =
             |write: &Write| write.verify != 0 && write.optional().is_none_or(|bit| declined & bit == 0);
-        configuration(&self.profile, self.mode_profile(), self.control, j)
+        configuration(&arm.profile, arm.mode(), arm.control, j)
             .filter(|write| !verifying || kept(write))
             .nth(step)
     }
 
     /// Begins joint `j`'s next step; `None` where its script is done.
-    fn begin_step(&mut self, j: usize) -> Option<Frame> {
-        let (now, pause) = (self.now, self.sdo_pause());
-        let step = self.joints.get(j)?.step;
-        let frame = match self.phase {
-            Phase::Identify => {
-                let object = questions(self.mode_profile(), self.control).nth(step)?;
-                Some(self.joints.get_mut(j)?.client.read(object, now))
+    fn begin_step(&mut self, arm: &mut Arm<N>, j: usize) -> Option<Frame> {
+        let (now, pause) = (arm.now, pause(arm));
+        let frame = match self.script {
+            Script::Identify => {
+                let object = questions(arm.mode(), arm.control).nth(self.places.get(j)?.step)?;
+                arm.joints.get_mut(j)?.client.read(object, now)
             }
-            Phase::Configure => {
-                let write = self.write_of(j, step)?;
-                Some(self.joints.get_mut(j)?.client.write(write.object, write.value(), now))
+            Script::Configure => {
+                let write = self.write_of(arm, j)?;
+                arm.joints.get_mut(j)?.client.write(write.object, write.value(), now)
             }
-            Phase::Verify => {
-                let write = self.write_of(j, step)?;
-                Some(self.joints.get_mut(j)?.client.read(write.object, now))
+            Script::Verify => {
+                let write = self.write_of(arm, j)?;
+                arm.joints.get_mut(j)?.client.read(write.object, now)
             }
-            _ => None,
         };
-        self.joints.get_mut(j)?.next_step = now + pause;
-        frame
+        self.places.get_mut(j)?.next = now + pause;
+        Some(frame)
     }
 
-    pub(super) fn poll_scripts(&mut self, tx: &mut impl Transmit) {
-        let mut done = true;
-        let phase = self.phase;
+    /// Takes the joints further, script after script; true when all are done.
+    ///
+    /// # Errors
+    /// The cause, where a drive does not answer as it must.
+    pub(super) fn poll(&mut self, arm: &mut Arm<N>, tx: &mut impl Transmit) -> Result<bool, Cause> {
+        while self.poll_joints(arm, tx)? {
+            self.script = match self.script {
+                Script::Identify => Script::Configure,
+                Script::Configure => Script::Verify,
+                Script::Verify => return Ok(true),
+            };
+            self.places.iter_mut().for_each(|place| (place.step, place.retries) = (0, 0));
+        }
+        Ok(false)
+    }
+
+    /// True when this script is done.
+    fn poll_joints(&mut self, arm: &mut Arm<N>, tx: &mut impl Transmit) -> Result<bool, Cause> {
+        let (mut done, now) = (true, arm.now);
         for j in 0..N {
-            let now = self.now;
-            let Some(joint) = self.joints.get_mut(j) else { continue };
-            if joint.client.is_idle() {
-                if now < joint.next_step {
-                    done = false;
-                    continue;
-                }
-                let Some(frame) = self.begin_step(j) else { continue };
-                self.send(frame, tx);
-            } else {
+            let (Some(joint), Some(place)) = (arm.joints.get_mut(j), self.places.get(j)) else { continue };
+            if !joint.client.is_idle() {
+                done = false;
                 let step = joint.client.poll(now);
                 if let Some(frame) = step.send {
-                    self.send(frame, tx);
+                    arm.send(frame, tx);
                 }
                 if let Some(result) = step.done {
-                    self.script_result(j, result, tx);
+                    self.answer(arm, j, result)?;
                 }
-            }
-            done = false;
-            if self.phase != phase {
-                return;
+            } else if now < place.next {
+                done = false;
+            } else if let Some(frame) = self.begin_step(arm, j) {
+                done = false;
+                arm.send(frame, tx);
             }
         }
-        match phase {
-            _ if !done => {}
-            Phase::Identify => self.enter_script(Phase::Configure, tx),
-            Phase::Configure => self.enter_script(Phase::Verify, tx),
-            Phase::Verify => self.begin_cycles(tx),
-            _ => {}
-        }
+        Ok(done)
     }
 
-    /// The end of a transfer of a script.
-    pub(super) fn script_result(
+    /// The end of a transfer of joint `j`.
+    ///
+    /// # Errors
+    /// The cause, where it is not as it must be.
+    pub(super) fn answer(
         &mut self,
+        arm: &mut Arm<N>,
         j: usize,
-        result: Result<Value, SdoError>,
-        tx: &mut impl Transmit,
-    ) {
-        let retries = self.profile.reactions.sdo_retries;
-        let Some(joint) = self.joints.get_mut(j) else { return };
-        let object = joint.client.object();
-        if result == Err(SdoError::Timeout) && joint.retries < retries {
-            joint.retries += 1;
-        } else {
-            let judged = match self.phase {
-                Phase::Identify => self.judge_answer(j, object, result),
-                Phase::Configure => self.judge_write(j, object, result),
-                Phase::Verify => self.judge_read_back(j, object, result),
-                _ => return,
-            };
-            if let Err(cause) = judged {
-                self.trip(cause, tx);
-                return;
-            }
-            if let Some(joint) = self.joints.get_mut(j) {
-                joint.step += 1;
-                joint.retries = 0;
-            }
-        }
-    }
-
-    fn judge_answer(
-        &mut self,
-        j: usize,
-        object: Object,
         result: Result<Value, SdoError>,
     ) -> Result<(), Cause> {
-        let node = self.node(j);
-        let target = self.mode_profile().setpoint;
-        let failed = |error| Cause::Sdo(node, object, error);
-        let number = result.and_then(|value| value.unsigned().ok_or(SdoError::Protocol(AbortCode::LENGTH)));
-        let (Some(profile), Some(joint)) = (self.profile.joints.get(j), self.joints.get_mut(j)) else {
-            return Ok(());
-        };
-        let id = profile.identity;
-        let [vendor, product, revision, serial] = &mut joint.identity;
-        let identity = match object {
-            DEVICE_TYPE => Some((&mut joint.device_type, Some(DRIVES))),
-            VENDOR_ID => Some((vendor, id.vendor)),
-            PRODUCT_CODE => Some((product, id.product)),
-            REVISION => Some((revision, id.revision)),
-            SERIAL_NUMBER => Some((serial, id.serial)),
-            _ => None,
-        };
-        if let Some((place, expected)) = identity {
-            *place = number.ok();
-            // The high bits of the device type say what kind of drive it is.
-            let same = |found: u32, expected| match object {
-                DEVICE_TYPE => found & 0xFFFF == expected,
-                _ => found == expected,
-            };
-            // A drive need not have every part; what the profile knows, it must have.
-            let deviation = match (number, expected) {
-                (Ok(found), Some(expected)) if !same(found, expected) => {
-                    Cause::WrongIdentity(node, object, expected, found)
-                }
-                (Ok(_), _) | (Err(SdoError::Aborted(_)), None) => return Ok(()),
-                (Err(error), _) => failed(error),
-            };
-            let acceptable = matches!(deviation, Cause::WrongIdentity(..))
-                || matches!(deviation, Cause::Sdo(_, _, SdoError::Aborted(_)));
-            return if self.other_nodes && acceptable {
-                self.note(deviation);
-                Ok(())
-            } else {
-                Err(deviation)
-            };
-        }
-        // A drive need not report it; the profile's limit is used then.
-        if object == objects::MAX_CURRENT {
-            let stated = number.ok().filter(|n| (1..=u32::from(u16::MAX)).contains(n));
-            joint.current_limit =
-                stated.map(|n| joint.units.current(n as i32).abs()).filter(|limit| *limit > 0.0);
-            return match number {
-                Ok(_) | Err(SdoError::Aborted(_)) => Ok(()),
-                Err(error) => Err(failed(error)),
-            };
-        }
-        // A target that is there and cannot be read: that it is followed is watched anyway.
-        if object == target
-            && let Err(SdoError::Aborted(code)) = number
-            && !matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUB_INDEX)
-        {
+        let retries = arm.profile.reactions.sdo_retries;
+        let (Some(joint), Some(place)) = (arm.joints.get(j), self.places.get_mut(j)) else { return Ok(()) };
+        let object = joint.client.object();
+        if result == Err(SdoError::Timeout) && place.retries < retries {
+            place.retries += 1;
             return Ok(());
         }
-        let number = number.map_err(failed)?;
-        match object {
-            objects::SUPPORTED_MODES => {
-                let mode =
-                    self.profile.mode(self.control).map_or(crate::cia402::Mode::None, |mode| mode.mode);
-                if mode.is_in(number) == Some(false) {
-                    return Err(Cause::ModeNotOffered(node, mode, number));
-                }
-            }
-            objects::RATED_CURRENT if number > 0 => joint.units.rated_current = f64::from(number) / 1000.0,
-            // Without a scale of its own the drive's currents are nonsense, and a current set-point more so.
-            objects::RATED_CURRENT if profile.units.rated_current <= 0.0 => {
-                return Err(Cause::Implausible(node, object, number));
-            }
-            objects::VL_FACTOR_NUMERATOR => joint.velocity_numerator = number as i32,
-            objects::VL_FACTOR_DENOMINATOR => {
-                let scale = self.profile.velocity_scale.at(joint.velocity_numerator, number as i32);
-                joint.velocity_count = scale.ok_or(Cause::Implausible(node, object, number))?;
-            }
-            _ => {}
+        match self.script {
+            Script::Identify => judge_answer(arm, j, object, result),
+            Script::Configure => self.judge_write(arm, j, object, result),
+            Script::Verify => self.judge_read_back(arm, j, object, result),
+        }?;
+        if let Some(place) = self.places.get_mut(j) {
+            (place.step, place.retries) = (place.step + 1, 0);
         }
         Ok(())
     }
 
     fn judge_write(
-        &mut self,
+        &self,
+        arm: &mut Arm<N>,
         j: usize,
         object: Object,
         result: Result<Value, SdoError>,
     ) -> Result<(), Cause> {
-        let write = self.joints.get(j).and_then(|joint| self.write_of(j, joint.step));
+        let write = self.write_of(arm, j);
         if let (Err(SdoError::Aborted(_)), Some(bit)) = (result, write.and_then(|write| write.optional())) {
-            if let Some(joint) = self.joints.get_mut(j) {
+            if let Some(joint) = arm.joints.get_mut(j) {
                 joint.declined |= bit;
             }
             return Ok(());
         }
         let cause = if write.is_some_and(|write| write.is_watch()) { Cause::NoWatch } else { Cause::Sdo };
-        result.map(|_| ()).map_err(|error| cause(self.node(j), object, error))
+        result.map(|_| ()).map_err(|error| cause(arm.node(j), object, error))
     }
 
     fn judge_read_back(
         &self,
+        arm: &Arm<N>,
         j: usize,
         object: Object,
         result: Result<Value, SdoError>,
     ) -> Result<(), Cause> {
-        let node = self.node(j);
+        let node = arm.node(j);
         let value = result.map_err(|error| Cause::Sdo(node, object, error))?;
-        let Some(write) = self.joints.get(j).and_then(|joint| self.write_of(j, joint.step)) else {
-            return Ok(());
-        };
+        let Some(write) = self.write_of(arm, j) else { return Ok(()) };
         let read = value.unsigned().unwrap_or(0) & write.verify;
         if read == write.expected() && !value.as_slice().is_empty() {
             Ok(())
@@ -305,189 +258,134 @@ impl<const N: usize> Driver<N> {
             Err(Cause::NotTaken(node, object, write.expected(), read))
         }
     }
-
-    /// Configured and verified: process data and watching begin.
-    fn begin_cycles(&mut self, tx: &mut impl Transmit) {
-        let now = self.now;
-        for joint in &mut self.joints {
-            joint.heartbeat.beat(now);
-            joint.watched = super::watch::Watched::default();
-            (joint.arrived, joint.missing_run, joint.overspeed_run) = (0, 0, 0);
-            (joint.status, joint.mode, joint.nmt) = (None, None, None);
-        }
-        (self.late_run, self.good_run) = (0, 0);
-        self.manage(nmt::Command::Start, tx);
-        self.sync.start(now);
-        self.enter(Phase::Starting);
-    }
-
-    /// The first joint whose drive is not in the right mode, without torque.
-    pub(super) fn unready(&self) -> Option<usize> {
-        let expected = self.mode_profile().mode;
-        let ready = |joint: &super::Joint| joint.state().is_some_and(is_off) && joint.mode == Some(expected);
-        self.joints.iter().position(|joint| !ready(joint))
-    }
-
-    pub(super) fn poll_starting(&mut self, tx: &mut impl Transmit) {
-        let expected = self.mode_profile().mode;
-        let unready = self.unready();
-        if unready.is_none() && self.cycle_complete() {
-            self.enter(Phase::Ready);
-            return;
-        }
-        let hindered = unready.or_else(|| self.joints.iter().position(|joint| joint.missing_run > 0));
-        let Some(j) = hindered else { return };
-        if self.elapsed() < self.profile.reactions.transition_timeout {
-            return;
-        }
-        let (node, Some(joint)) = (self.node(j), self.joints.get(j)) else { return };
-        let cause = match (joint.state(), joint.mode) {
-            (None, _) | (_, None) => Cause::DataMissing(node),
-            (Some(state), _) if !is_off(state) => {
-                Cause::Transition(node, state, State::SwitchOnDisabled, Hindrance::of(joint.status, true))
-            }
-            (_, Some(mode)) if mode != expected => Cause::WrongMode(node, mode),
-            _ => Cause::DataMissing(node),
-        };
-        self.trip(cause, tx);
-    }
-
-    pub(super) fn poll_enabling(&mut self, tx: &mut impl Transmit) {
-        for j in 0..N {
-            let turn = !self.profile.reactions.one_at_a_time
-                || self.joints.iter().take(j).all(|joint| joint.progress == Progress::Done);
-            let Some(progress) = self.joints.get(j).map(|joint| joint.progress) else { continue };
-            match progress {
-                Progress::Waiting if turn => self.begin_walk(j),
-                Progress::Walking { .. } => self.walk(j, tx),
-                Progress::Commutating { next, .. } => self.poll_commutation(j, next, tx),
-                Progress::Settling { until } if self.now >= until => self.progress(j, Progress::Done),
-                _ => {}
-            }
-            if self.phase != Phase::Enabling {
-                return;
-            }
-        }
-        if self.joints.iter().all(|joint| joint.progress == Progress::Done) {
-            let control = self.control;
-            for joint in &mut self.joints {
-                joint.preset(control);
-                (joint.swept, joint.swept_from) = (0.0, joint.position);
-            }
-            self.release_watch();
-            (self.fresh, self.rejection, self.streaming) = (false, None, false);
-            self.pending = false;
-            (self.rejected_run, self.starved_run) = (0, 0);
-            self.enter(Phase::Running);
-        }
-    }
-
-    fn progress(&mut self, j: usize, progress: Progress) {
-        if let Some(joint) = self.joints.get_mut(j) {
-            joint.progress = progress;
-        }
-    }
-
-    fn begin_walk(&mut self, j: usize) {
-        let deadline = self.now + self.profile.reactions.transition_timeout;
-        let state = self.joints.get(j).and_then(|joint| joint.state()).unwrap_or(State::SwitchOnDisabled);
-        self.progress(j, Progress::Walking { state, deadline });
-    }
-
-    fn walk(&mut self, j: usize, tx: &mut impl Transmit) {
-        let Some(joint) = self.joints.get(j) else { return };
-        let (Progress::Walking { state, deadline }, Some(now_in)) = (joint.progress, joint.state()) else {
-            return;
-        };
-        let status = joint.status;
-        let failed = |wanted, on_the_way| {
-            Cause::Transition(self.node(j), now_in, wanted, Hindrance::of(status, on_the_way))
-        };
-        match (step_of(state), step_of(now_in)) {
-            // Only SCHUNK's drives say when their commutation search is done.
-            (_, Some(4)) if self.profile.sync_timeout_factor.is_none() => self.progress(j, Progress::Done),
-            (_, Some(4)) => self.progress(j, Progress::Commutating { reads: 0, next: self.now }),
-            (Some(before), Some(after)) if after > before => {
-                let deadline = self.now + self.profile.reactions.transition_timeout;
-                self.progress(j, Progress::Walking { state: now_in, deadline });
-            }
-            (Some(before), Some(after)) if after == before && self.now < deadline => {}
-            (_, after) => self.trip(failed(next_of(state), after == step_of(state)), tx),
-        }
-    }
-
-    fn poll_commutation(&mut self, j: usize, next: Micros, tx: &mut impl Transmit) {
-        let now = self.now;
-        let Some(joint) = self.joints.get_mut(j) else { return };
-        if !joint.client.is_idle() {
-            let step = joint.client.poll(now);
-            if let Some(frame) = step.send {
-                self.send(frame, tx);
-            }
-            if let Some(result) = step.done {
-                self.commutation_result(j, result, tx);
-            }
-        } else if now >= next {
-            let frame = joint.client.read(schunk::EXTENDED_STATUS, now);
-            self.send(frame, tx);
-        }
-    }
-
-    /// The drive's answer on whether its commutation search is done. Until it is, the joint is commanded to
-    /// stay where it is.
-    pub(super) fn commutation_result(
-        &mut self,
-        j: usize,
-        result: Result<Value, SdoError>,
-        tx: &mut impl Transmit,
-    ) {
-        let (reactions, now) = (self.profile.reactions, self.now);
-        let Some(Progress::Commutating { reads, .. }) = self.joints.get(j).map(|joint| joint.progress) else {
-            return;
-        };
-        let found = match result {
-            Ok(value) => value.unsigned().is_some_and(|status| status as u8 & schunk::COMMUTATED != 0),
-            Err(SdoError::Timeout) => false,
-            Err(error) => {
-                self.trip(Cause::Sdo(self.node(j), schunk::EXTENDED_STATUS, error), tx);
-                return;
-            }
-        };
-        match (found, reads) {
-            (true, 0) => self.progress(j, Progress::Done),
-            (true, _) => self.progress(j, Progress::Settling { until: now + reactions.commutation_settle }),
-            (false, reads) if reads >= reactions.commutation_tries => {
-                self.trip(Cause::NoCommutation(self.node(j)), tx);
-            }
-            (false, reads) => {
-                let next = now + reactions.commutation_interval;
-                self.progress(j, Progress::Commutating { reads: reads + 1, next });
-            }
-        }
-    }
 }
 
-/// Whether a drive needs no change until it is enabled.
-fn is_off(state: State) -> bool {
-    matches!(state, State::SwitchOnDisabled | State::ReadyToSwitchOn | State::SwitchedOn)
+/// Between two steps of one joint: as long as a round of all joints takes, and half of that again. Transfers
+/// without a pause would fill the bus, and the master's heartbeat, lowest in priority, would be missed by the
+/// drives.
+fn pause<const N: usize>(arm: &Arm<N>) -> Micros {
+    let round_trip = arm.budget.duration(2 * worst_bits(8));
+    round_trip * N as u64 * 3 / 2
 }
 
-/// Steps on the way to "operation enabled"; states that are not on it have none.
-fn step_of(state: State) -> Option<u8> {
-    match state {
-        State::SwitchOnDisabled => Some(1),
-        State::ReadyToSwitchOn => Some(2),
-        State::SwitchedOn => Some(3),
-        State::OperationEnabled => Some(4),
-        _ => None,
+/// Judges what a drive says of itself; what is used later is kept.
+fn judge_answer<const N: usize>(
+    arm: &mut Arm<N>,
+    j: usize,
+    object: Object,
+    result: Result<Value, SdoError>,
+) -> Result<(), Cause> {
+    let number = result.and_then(|value| value.unsigned().ok_or(SdoError::Protocol(AbortCode::LENGTH)));
+    if matches!(object, DEVICE_TYPE | VENDOR_ID | PRODUCT_CODE | REVISION | SERIAL_NUMBER) {
+        return judge_identity(arm, j, object, number);
     }
+    let (node, mode) = (arm.node(j), *arm.mode());
+    let failed = |error| Cause::Sdo(node, object, error);
+    let (Some(profile), Some(joint)) = (arm.profile.joints.get(j), arm.joints.get_mut(j)) else {
+        return Ok(());
+    };
+    // A drive need not report it; the profile's limit is used then.
+    if object == objects::MAX_CURRENT {
+        let stated = number.ok().filter(|n| (1..=u32::from(u16::MAX)).contains(n));
+        joint.current_limit =
+            stated.map(|n| joint.units.current(n as i32).abs()).filter(|limit| *limit > 0.0);
+        return match number {
+            Ok(_) | Err(SdoError::Aborted(_)) => Ok(()),
+            Err(error) => Err(failed(error)),
+        };
+    }
+    // A target that is there and cannot be read: that it is followed is watched anyway.
+    if object == mode.setpoint
+        && let Err(SdoError::Aborted(code)) = number
+        && !matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUB_INDEX)
+    {
+        return Ok(());
+    }
+    let number = number.map_err(failed)?;
+    match object {
+        objects::SUPPORTED_MODES if mode.mode.is_in(number) == Some(false) => {
+            return Err(Cause::ModeNotOffered(node, mode.mode, number));
+        }
+        objects::RATED_CURRENT if number > 0 => joint.units.rated_current = f64::from(number) / 1000.0,
+        // Without a scale of its own the drive's currents are nonsense, and a current set-point more so.
+        objects::RATED_CURRENT if profile.units.rated_current <= 0.0 => {
+            return Err(Cause::Implausible(node, object, number));
+        }
+        objects::VL_FACTOR_NUMERATOR => joint.velocity_numerator = number as i32,
+        objects::VL_FACTOR_DENOMINATOR => {
+            let scale = arm.profile.velocity_scale.at(joint.velocity_numerator, number as i32);
+            joint.velocity_count = scale.ok_or(Cause::Implausible(node, object, number))?;
+        }
+        _ => {}
+    }
+    Ok(())
 }
 
-/// The next state on the way.
-fn next_of(state: State) -> State {
-    match state {
-        State::ReadyToSwitchOn => State::SwitchedOn,
-        State::SwitchedOn | State::OperationEnabled => State::OperationEnabled,
-        _ => State::ReadyToSwitchOn,
+/// Judges the device type and the identity.
+fn judge_identity<const N: usize>(
+    arm: &mut Arm<N>,
+    j: usize,
+    object: Object,
+    number: Result<u32, SdoError>,
+) -> Result<(), Cause> {
+    let node = arm.node(j);
+    let (Some(profile), Some(joint)) = (arm.profile.joints.get(j), arm.joints.get_mut(j)) else {
+        return Ok(());
+    };
+    let (id, [vendor, product, revision, serial]) = (profile.identity, &mut joint.identity);
+    let (place, expected) = match object {
+        DEVICE_TYPE => (&mut joint.device_type, Some(DRIVES)),
+        VENDOR_ID => (vendor, id.vendor),
+        PRODUCT_CODE => (product, id.product),
+        REVISION => (revision, id.revision),
+        _ => (serial, id.serial),
+    };
+    *place = number.ok();
+    // The high bits of the device type say what kind of drive it is.
+    let same = |found: u32, expected| match object {
+        DEVICE_TYPE => found & 0xFFFF == expected,
+        _ => found == expected,
+    };
+    // A drive need not have every part; what the profile knows, it must have.
+    let (deviation, acceptable) = match (number, expected) {
+        (Ok(found), Some(expected)) if !same(found, expected) => {
+            (Cause::WrongIdentity(node, object, expected, found), true)
+        }
+        (Ok(_), _) | (Err(SdoError::Aborted(_)), None) => return Ok(()),
+        (Err(error), _) => (Cause::Sdo(node, object, error), matches!(error, SdoError::Aborted(_))),
+    };
+    if arm.other_nodes && acceptable {
+        arm.note(deviation);
+        return Ok(());
     }
+    Err(deviation)
+}
+
+/// Configured and verified: process data begins.
+pub(super) fn begin_cycles<const N: usize>(arm: &mut Arm<N>, tx: &mut impl Transmit) {
+    let now = arm.now;
+    for joint in &mut arm.joints {
+        joint.presence.begin(now);
+        (joint.status, joint.mode, joint.nmt) = (None, None, None);
+    }
+    arm.manage(nmt::Command::Start, tx);
+}
+
+/// While the first process data is awaited, since `since`: whether a joint has come too late, and why.
+pub(super) fn first_data<const N: usize>(arm: &Arm<N>, since: Micros) -> Option<Cause> {
+    let expected = arm.mode().mode;
+    let missing = || arm.joints.iter().position(|joint| joint.presence.missing() > 0);
+    let j = arm.unready().or_else(missing)?;
+    if arm.elapsed(since) < arm.profile.reactions.transition_timeout {
+        return None;
+    }
+    let (node, joint) = (arm.node(j), arm.joints.get(j)?);
+    Some(match (joint.state(), joint.mode) {
+        (None, _) | (_, None) => Cause::DataMissing(node),
+        (Some(state), _) if !is_off(state) => {
+            Cause::Transition(node, state, State::SwitchOnDisabled, Hindrance::of(joint.status, true))
+        }
+        (_, Some(mode)) if mode != expected => Cause::WrongMode(node, mode),
+        _ => Cause::DataMissing(node),
+    })
 }

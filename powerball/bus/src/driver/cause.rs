@@ -2,8 +2,7 @@
 //!
 //! [`Rejection`] says why a set-point is not sent.
 
-use super::receive::Foreign;
-use super::torque::ControlMode;
+use super::demand::ControlMode;
 use crate::canopen::client::SdoError;
 use crate::canopen::emcy::{Emcy, vendor_text};
 use crate::canopen::objects::{DEVICE_TYPE, PRODUCT_CODE, REVISION, VENDOR_ID};
@@ -12,6 +11,30 @@ use crate::canopen::{NodeId, Object};
 use crate::cia402::{Mode, State, Statusword};
 use core::fmt;
 use powerball_controller::JointNumber;
+
+/// A frame that was received from another master.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Foreign {
+    /// SYNC.
+    Sync,
+    /// A command of network management.
+    Nmt,
+    /// Set-points for a node of the arm.
+    Setpoints(NodeId),
+    /// A heartbeat with the master's own node id.
+    Heartbeat(NodeId),
+}
+
+impl fmt::Display for Foreign {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Foreign::Sync => f.write_str("SYNC"),
+            Foreign::Nmt => f.write_str("network management commands"),
+            Foreign::Setpoints(node) => write!(f, "set-points for node {node}"),
+            Foreign::Heartbeat(node) => write!(f, "the heartbeat of node {node}, which is this master's"),
+        }
+    }
+}
 
 /// The reason for a missing transition, as the statusword gives it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

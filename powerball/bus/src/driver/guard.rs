@@ -1,8 +1,8 @@
 //! Conditions that a set-point must meet before it is sent, and a whole path before the arm moves.
 
 use super::cause::Rejection;
+use super::demand::{ControlMode, Demand, rest};
 use super::profile::{JointProfile, Profile, Reactions};
-use super::torque::{ControlMode, Demand, rest};
 use powerball_controller::JointNumber;
 
 /// The guard of one joint in one cycle.

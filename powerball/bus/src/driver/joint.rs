@@ -2,16 +2,13 @@
 //!
 //! The traits and events between driver and transport: [`Transmit`] and [`BusEvent`].
 
+use super::demand::{ControlMode, Demand};
+use super::presence::Presence;
 use super::profile::{JointProfile, ModeProfile};
-use super::script::Progress;
-use super::torque::{ControlMode, Demand};
-use super::torque_mode::Guarded;
 use super::units::{JointUnits, Saturated, to_i16};
-use super::watch::Watched;
 use crate::canopen::client::Client;
 use crate::canopen::emcy::Emcy;
 use crate::canopen::pdo::{Mapping, sign_extend};
-use crate::canopen::sync::HeartbeatConsumer;
 use crate::canopen::{Cob, Frame, Micros, nmt};
 use crate::cia402::{Command, Controlword, Mode, State, Statusword, objects};
 
@@ -63,42 +60,25 @@ pub struct Joint {
     pub(super) velocity_count: f64,
     pub(super) velocity_numerator: i32,
     pub(super) client: Client,
-    pub(super) step: usize,
-    pub(super) retries: u8,
-    /// Earliest time of the next step.
-    pub(super) next_step: Micros,
     pub(super) booted: Option<Micros>,
-    pub(super) heartbeat: HeartbeatConsumer,
-    /// Transmit PDOs that came since the last SYNC, by bit.
-    pub(super) arrived: u8,
-    pub(super) missing_run: u8,
-    /// Process data came twice in this cycle, and in how many cycles in a row.
-    pub(super) duplicated: bool,
-    pub(super) duplicate_run: u8,
-    pub(super) overspeed_run: u8,
-    pub(super) progress: Progress,
+    pub(super) presence: Presence,
     /// Accepted set-point, and those that have left; rad, rad/s or A.
     pub(super) target: f64,
     pub(super) demand: Demand,
     /// Torque offset that goes with the set-points, N·m.
     pub(super) offset: f64,
-    pub(super) watched: Watched,
-    pub(super) guarded: Guarded,
     /// Cycles, by the driver's count, whose position and velocity came last.
     pub(super) position_cycle: u64,
     pub(super) velocity_cycle: u64,
+    /// The velocity before the last one, and how many cycles lay between them.
+    pub(super) velocity_before: (f64, u64),
     /// Greatest current that the drive gives (0x6073), A, if the drive reports it.
     pub(super) current_limit: Option<f64>,
     /// Settings that the drive declined and need not have, by bit.
     pub(super) declined: u8,
     /// Profile position: the target announced last, and whether its announcing bit is up.
-    pub(super) announced: Option<i32>,
-    pub(super) raised: bool,
-    /// Travel that velocity set-points commanded since `swept_from`, rad, and the position then.
-    pub(super) swept: f64,
-    pub(super) swept_from: f64,
-    /// A stop that could not be queued yet.
-    pub(super) unsent: bool,
+    announced: Option<i32>,
+    raised: bool,
 }
 
 impl Joint {
@@ -120,31 +100,18 @@ impl Joint {
             velocity_count: 1.0,
             velocity_numerator: 0,
             client: Client::new(profile.node, sdo_timeout),
-            step: 0,
-            retries: 0,
-            next_step: 0,
             booted: None,
-            heartbeat: HeartbeatConsumer::new(heartbeat_timeout),
-            arrived: 0,
-            missing_run: 0,
-            duplicated: false,
-            duplicate_run: 0,
-            overspeed_run: 0,
-            progress: Progress::Waiting,
+            presence: Presence::new(heartbeat_timeout),
             target: 0.0,
             demand: Demand::at_rest(0.0),
             offset: 0.0,
-            watched: Watched::default(),
-            guarded: Guarded::default(),
             position_cycle: 0,
             velocity_cycle: 0,
+            velocity_before: (0.0, 0),
             current_limit: None,
             declined: 0,
             announced: None,
             raised: false,
-            swept: 0.0,
-            swept_from: 0.0,
-            unsent: false,
         }
     }
 
@@ -153,8 +120,25 @@ impl Joint {
         self.status.map(Statusword::state)
     }
 
-    /// Stores the process data of transmit PDO `number`; returns false if it does not fit the mapping.
-    pub(super) fn update(&mut self, number: u8, mapping: &Mapping, frame: &Frame) -> bool {
+    /// Whether the drive gives torque; not before its first process data.
+    pub(super) fn has_torque(&self) -> bool {
+        self.state().is_some_and(State::has_torque)
+    }
+
+    /// Whether the drive says that it gives no torque.
+    pub(super) fn is_off(&self) -> bool {
+        self.state().is_some_and(|state| !state.has_torque())
+    }
+
+    /// Stores the process data of transmit PDO `number`, which came at `now` in `cycle`; returns false if it
+    /// does not fit the mapping.
+    pub(super) fn update(
+        &mut self,
+        number: u8,
+        mapping: &Mapping,
+        frame: &Frame,
+        (now, cycle): (Micros, u64),
+    ) -> bool {
         let Some(values) = mapping.unpack(frame.bytes()) else {
             self.counters.malformed += 1;
             return false;
@@ -164,8 +148,15 @@ impl Joint {
             match entry.object {
                 objects::STATUSWORD => self.status = Some(Statusword(raw as u16)),
                 objects::MODE_DISPLAY => self.mode = Some(Mode::from_code(raw as i8)),
-                objects::POSITION => self.position = self.units.position(signed),
-                objects::VELOCITY => self.velocity = self.units.position(signed),
+                objects::POSITION => {
+                    self.position = self.units.position(signed);
+                    self.position_cycle = cycle;
+                }
+                objects::VELOCITY => {
+                    self.velocity_before = (self.velocity, cycle.saturating_sub(self.velocity_cycle));
+                    self.velocity = self.units.position(signed);
+                    self.velocity_cycle = cycle;
+                }
                 objects::TORQUE => {
                     self.current = self.units.current(signed);
                     self.torque = self.units.torque(signed);
@@ -173,13 +164,15 @@ impl Joint {
                 _ => {}
             }
         }
-        let bit = 1 << (number - 1);
-        if self.arrived & bit != 0 {
-            self.counters.duplicates += 1;
-            self.duplicated = true;
-        }
-        self.arrived |= bit;
+        self.answered_at = now;
+        self.counters.duplicates += u64::from(self.presence.arrive(number));
         true
+    }
+
+    /// The last velocity is not to be used: the one before takes its place.
+    pub(super) fn reject_velocity(&mut self) {
+        self.counters.implausible += 1;
+        self.velocity = self.velocity_before.0;
     }
 
     /// The number on the wire for a set-point in rad, rad/s or A.
@@ -203,18 +196,6 @@ impl Joint {
         self.offset = 0.0;
         self.announced = None;
         self.raised = false;
-    }
-
-    /// A cycle of `period` s with the velocity that was sent. Once enough travel was commanded: the part of
-    /// it that the joint has gone, and a new beginning.
-    pub(super) fn sweep(&mut self, period: f64, enough: f64) -> Option<f64> {
-        self.swept += self.demand.last() * period;
-        if self.swept.abs() < enough {
-            return None;
-        }
-        let part = (self.position - self.swept_from) / self.swept;
-        (self.swept, self.swept_from) = (0.0, self.position);
-        Some(part)
     }
 
     /// The controlword that leads to "operation enabled" from where the drive is, with the brake closed.

@@ -3,7 +3,7 @@
 //! LWA 4P).
 
 use super::cause::Refusal;
-use super::torque::ControlMode;
+use super::demand::ControlMode;
 use super::units::{JointUnits, VelocityScale};
 use crate::canopen::pdo::{Entry, Mapping};
 use crate::canopen::{Micros, NodeId, Object};

@@ -1,17 +1,15 @@
 //! The objects that are read from and written to each drive before it may move, as lists without allocation.
-//!
-//! A joint's progress through these lists is here, too.
 
+use super::demand::ControlMode;
 use super::profile::{ModeProfile, Profile};
-use super::torque::ControlMode;
 use crate::canopen::client::Value;
 use crate::canopen::objects::{
     CONSUMER_HEARTBEAT, DEVICE_TYPE, PRODUCER_HEARTBEAT, PRODUCT_CODE, REVISION, SERIAL_NUMBER, VENDOR_ID,
     rpdo_mapping, rpdo_parameter, tpdo_mapping, tpdo_parameter,
 };
 use crate::canopen::pdo::{EVERY_SYNC, INVALID, Mapping};
-use crate::canopen::{Cob, Micros, NodeId, Object};
-use crate::cia402::{State, objects, schunk};
+use crate::canopen::{Cob, NodeId, Object};
+use crate::cia402::{objects, schunk};
 
 /// One write, and how it is verified.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -179,24 +177,6 @@ pub(super) fn questions(mode: &ModeProfile, control: ControlMode) -> impl Iterat
     let scaled = control == ControlMode::Velocity;
     // The target itself: a drive that has it not says so now, and not in the middle of its mapping.
     always.chain(velocity.into_iter().filter(move |_| scaled)).chain([mode.setpoint])
-}
-
-// How far a joint is on its way to its operation.
-
-/// How far a joint is on its way to "operation enabled".
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Progress {
-    /// The joint's turn has not come.
-    Waiting,
-    /// Through the drive's states; in `state` until `deadline`.
-    Walking { state: State, deadline: Micros },
-    /// Enabled; the extended status was read `reads` times, next at `next`. From the second read on the brake
-    /// is open.
-    Commutating { reads: u8, next: Micros },
-    /// Commutated just now: the supply recovers.
-    Settling { until: Micros },
-    /// Enabled and commutated, halted until all are.
-    Done,
 }
 
 #[cfg(test)]

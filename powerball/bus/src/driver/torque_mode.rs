@@ -14,10 +14,11 @@
 //!
 //! The limits are [`TorqueMode`](super::profile::TorqueMode).
 
+use super::arm::Arm;
+use super::cause::Cause;
+use super::presence::run;
 use super::profile::JointProfile;
-use super::torque::{ControlMode, TorqueGuard};
-use super::watch::run;
-use super::{Cause, Driver, Phase, Rejection, Transmit};
+use super::torque::TorqueGuard;
 use crate::canopen::Micros;
 use core::cmp::Ordering;
 use powerball_controller::JointNumber;
@@ -37,9 +38,9 @@ const WINDOW: usize = 4;
 /// Below this part of the greatest velocity a joint may stick: all of its dry friction can hold it.
 const SLOW: f64 = 0.05;
 
-/// The guard's memory of one joint.
+/// The memory of one joint.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Guarded {
+struct Guarded {
     /// Positions and velocities of the last cycles with all data, newest first, and their SYNC.
     samples: [Sample; WINDOW + 1],
     /// How many of them there are, without a gap.
@@ -60,9 +61,10 @@ pub(super) struct Guarded {
     tracking: u8,
 }
 
-/// How the torque of a joint fits its motion, N·m: what acted less what the model needs, and how much that may be.
+/// How the torque of a joint fits its motion, N·m: what acted less what the model needs, and how much that
+/// may be.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Left {
+struct Left {
     left: f64,
     tolerance: f64,
 }
@@ -111,129 +113,117 @@ impl Guarded {
     }
 }
 
-impl<const N: usize> Driver<N> {
-    /// Currents (A) for the next SYNC as [`Driver::set`], with where the joints should be at the last one. A joint that is
-    /// farther from there than it may be stops the arm.
-    ///
-    /// # Errors
-    /// Those of [`Driver::set`].
-    pub fn set_tracked(&mut self, currents: &[f64; N], tracking: &Tracking<N>) -> Result<(), Rejection> {
-        self.set(currents)?;
-        let cycle = self.counters.cycles;
-        let joints = self.joints.iter_mut().zip(&tracking.position).zip(&tracking.tolerance);
-        for ((joint, position), tolerance) in joints {
-            let seen = joint.position_cycle == cycle;
-            joint.guarded.off = seen.then_some([joint.position - position, *tolerance]);
+/// The guard of current mode of all joints. It is asked while the arm follows currents; each check says what
+/// is wrong, and does nothing about it.
+#[derive(Clone, Debug)]
+pub(super) struct TorqueWatch<const N: usize> {
+    joints: [Guarded; N],
+}
+
+impl<const N: usize> TorqueWatch<N> {
+    /// Nothing is remembered: the joints are released.
+    pub(super) fn new() -> Self {
+        TorqueWatch { joints: [Guarded::default(); N] }
+    }
+
+    /// Where the joints should be at the last SYNC, for those whose positions have come.
+    pub(super) fn track(&mut self, arm: &Arm<N>, tracking: &Tracking<N>) {
+        let wanted = tracking.position.iter().zip(&tracking.tolerance);
+        for ((guarded, joint), (position, tolerance)) in self.joints.iter_mut().zip(&arm.joints).zip(wanted) {
+            let seen = joint.position_cycle == arm.counters.cycles;
+            guarded.off = seen.then_some([joint.position - position, *tolerance]);
         }
-        Ok(())
     }
 
-    /// Positions (rad) and velocities (rad/s) of the joints at the last SYNC. What has not come yet is carried on with the
-    /// last velocity; the second array says for how many cycles.
-    pub fn state(&self) -> ([[f64; N]; 2], [u64; N]) {
-        let (now, period) = (self.counters.cycles, self.profile.period_seconds());
-        let position = self.joints.each_ref().map(|joint| {
-            joint.position + joint.velocity * period * now.saturating_sub(joint.position_cycle) as f64
-        });
-        let missed = self
-            .joints
-            .each_ref()
-            .map(|joint| now.saturating_sub(joint.position_cycle.min(joint.velocity_cycle)));
-        ([position, self.joints.each_ref().map(|joint| joint.velocity)], missed)
-    }
-
-    /// Clears the memory of the guard: the joints are released.
-    pub(super) fn release_guard(&mut self) {
-        self.joints.iter_mut().for_each(|joint| joint.guarded = Guarded::default());
-    }
-
-    fn is_guarded(&self) -> bool {
-        self.phase == Phase::Running && self.control == ControlMode::Current
-    }
-
-    /// A velocity has come after `before`: one that no joint can have is replaced by that one.
-    pub(super) fn gate_velocity(&mut self, j: usize, before: f64, cycles: u64, tx: &mut impl Transmit) {
-        if !self.is_guarded() {
-            return;
-        }
-        let limits = self.profile.reactions.torque_mode;
-        let (Some(profile), Some(joint)) = (self.profile.joints.get(j), self.joints.get_mut(j)) else {
-            return;
-        };
-        let velocity = joint.velocity;
+    /// Each velocity: one that no joint can have is replaced by the one before.
+    pub(super) fn gate_velocity(&mut self, arm: &mut Arm<N>, j: usize) -> Option<Cause> {
+        let limits = arm.profile.reactions.torque_mode;
+        let (profile, joint) = (arm.profile.joints.get(j)?, arm.joints.get_mut(j)?);
+        let (velocity, (before, cycles)) = (joint.velocity, joint.velocity_before);
         // A brake may stop a joint within a cycle. Nothing speeds it up like that.
         let step = limits.velocity_step * profile.velocity * cycles.clamp(1, 10) as f64;
         let possible = (before.min(0.0) - step..=before.max(0.0) + step).contains(&velocity);
-        if run(&mut joint.guarded.implausible, !possible, limits.cycles) {
-            self.trip(Cause::ImplausibleVelocity(self.node(j), JointNumber::from_index(j), velocity), tx);
-        } else if !possible {
-            joint.counters.implausible += 1;
-            joint.velocity = before;
+        if run(&mut self.joints.get_mut(j)?.implausible, !possible, limits.cycles) {
+            return Some(Cause::ImplausibleVelocity(profile.node, JointNumber::from_index(j), velocity));
         }
+        if !possible {
+            joint.reject_velocity();
+        }
+        None
     }
 
-    /// Compares position and velocity of a joint when all its data has arrived.
-    pub(super) fn guard_sample(&mut self, j: usize, tx: &mut impl Transmit) {
-        if !self.is_guarded() {
-            return;
-        }
-        let (limits, at, period) =
-            (self.profile.reactions.torque_mode, self.synced_at, self.profile.period_seconds());
-        let (Some(profile), Some(joint)) = (self.profile.joints.get(j), self.joints.get_mut(j)) else {
-            return;
-        };
+    /// Compares position and velocity of a joint when all its data of the cycle of the SYNC `at` has arrived.
+    pub(super) fn slip(&mut self, arm: &Arm<N>, at: Micros, j: usize) -> Option<Cause> {
+        let (limits, period) = (&arm.profile.reactions.torque_mode, arm.profile.period_seconds());
+        let (profile, joint) = (arm.profile.joints.get(j)?, arm.joints.get(j)?);
         let sample = Sample { at, position: joint.position, velocity: joint.velocity };
-        let slip = joint.guarded.take(sample, period, profile, [limits.slip_margin, limits.slip_time]);
-        if let Some(slip) = slip {
-            let cause = Cause::PositionAgainstVelocity(self.node(j), JointNumber::from_index(j), slip);
-            self.trip(cause, tx);
-        }
+        let limits = [limits.slip_margin, limits.slip_time];
+        let slip = self.joints.get_mut(j)?.take(sample, period, profile, limits)?;
+        Some(Cause::PositionAgainstVelocity(profile.node, JointNumber::from_index(j), slip))
     }
 
-    /// Once a cycle, in current mode: how the torque that acted fits the motion that was measured. Nothing where there is no
-    /// model, or data was missing.
-    pub(super) fn torque_left(&mut self) -> Option<[Left; N]> {
-        if !self.is_guarded() {
-            return None;
+    /// Once a cycle: finds the joint with the largest torque error, among those whose error was too large for
+    /// too long.
+    pub(super) fn torque_error(&mut self, arm: &Arm<N>) -> Option<Cause> {
+        let limit = arm.profile.reactions.torque_mode.cycles;
+        let left = self.torque_left(arm)?;
+        let mut worst: Option<(f64, usize)> = None;
+        for (j, (guarded, of)) in self.joints.iter_mut().zip(&left).enumerate() {
+            let share = of.left.abs() / of.tolerance;
+            let long = run(&mut guarded.torque, beyond(share, 1.0), limit);
+            if long && worst.is_none_or(|(most, _)| beyond(share, most)) {
+                worst = Some((share, j));
+            }
         }
-        for joint in &mut self.joints {
-            joint.guarded.acted.rotate_right(1);
-            joint.guarded.acted[0] = joint.demand.last();
+        let (_, j) = worst?;
+        let Left { left, tolerance } = *left.get(j)?;
+        Some(Cause::TorqueError(arm.node(j), JointNumber::from_index(j), left, tolerance))
+    }
+
+    /// How the torque that acted fits the motion that was measured. Nothing where there is no model, or data
+    /// was missing.
+    fn torque_left(&mut self, arm: &Arm<N>) -> Option<[Left; N]> {
+        for (guarded, joint) in self.joints.iter_mut().zip(&arm.joints) {
+            guarded.acted.rotate_right(1);
+            guarded.acted[0] = joint.demand.last();
         }
-        let guard = self.torque_guard.as_ref()?;
-        if self.joints.iter().any(|joint| joint.missing_run > 0 || joint.guarded.count <= WINDOW) {
+        let guard = arm.torque_guard.as_ref()?;
+        let gap = arm.joints.iter().any(|joint| joint.presence.missing() > 0);
+        if gap || self.joints.iter().any(|guarded| guarded.count <= WINDOW) {
             return None;
         }
         let mean = |of: &dyn Fn(&Sample) -> f64| {
-            self.joints.each_ref().map(|joint| {
-                let s = &joint.guarded.samples;
+            self.joints.each_ref().map(|guarded| {
+                let s = &guarded.samples;
                 let inner: f64 = s[1..WINDOW].iter().map(of).sum();
                 (inner + 0.5 * (of(&s[0]) + of(&s[WINDOW]))) / WINDOW as f64
             })
         };
         let (q, dq) = (mean(&|s| s.position), mean(&|s| s.velocity));
-        let ddq = self.joints.each_ref().map(|joint| {
-            let s = &joint.guarded.samples;
-            (s[0].velocity - s[WINDOW].velocity) / joint.guarded.span().max(1e-6)
+        let ddq = self.joints.each_ref().map(|guarded| {
+            let s = &guarded.samples;
+            (s[0].velocity - s[WINDOW].velocity) / guarded.span().max(1e-6)
         });
         let need = guard.torque(&q, &dq, &ddq);
         let steady = guard.torque(&q, &dq, &[0.0; N]);
         let friction = guard.friction(&q, &dq);
         // One joint's a cycle: it changes with the pose alone.
-        let turn = (self.counters.cycles % N.max(1) as u64) as usize;
+        let turn = (arm.counters.cycles % N.max(1) as u64) as usize;
         let inertia = guard.inertia(&q, turn);
-        let slow = self.profile.joints.each_ref().map(|joint| SLOW * joint.velocity);
+        let slow = arm.profile.joints.each_ref().map(|joint| SLOW * joint.velocity);
         let dry = guard.friction(&q, &slow);
-        let (profile, limits) = (&self.profile, self.profile.reactions.torque_mode);
-        if let Some(joint) = self.joints.get_mut(turn) {
-            joint.guarded.inertia = Some(inertia);
+        let limits = &arm.profile.reactions.torque_mode;
+        if let Some(guarded) = self.joints.get_mut(turn) {
+            guarded.inertia = Some(inertia);
         }
         Some(core::array::from_fn(|j| {
-            let (Some(joint), Some(of)) = (self.joints.get(j), profile.joints.get(j)) else {
+            let (Some(joint), Some(guarded), Some(of)) =
+                (arm.joints.get(j), self.joints.get(j), arm.profile.joints.get(j))
+            else {
                 return Left::default();
             };
             // From the oldest sample's SYNC to the newest one's.
-            let current = joint.guarded.acted[2..].iter().sum::<f64>() / WINDOW as f64;
+            let current = guarded.acted[2..].iter().sum::<f64>() / WINDOW as f64;
             let acted = current * joint.units.torque_constant();
             let loose = if dq[j].abs() < slow[j] {
                 limits.sticking * dry[j].abs().max(friction[j].abs())
@@ -243,48 +233,31 @@ impl<const N: usize> Driver<N> {
             let weight = (steady[j] - friction[j]).abs();
             let rigid = limits.rigid_error * weight + limits.inertial_error * (need[j] - steady[j]).abs();
             // A light joint with a strong drive is far away before a tenth of its torque is missing.
-            let own = joint.guarded.inertia.map_or(f64::INFINITY, |inertia| inertia * of.acceleration);
+            let own = guarded.inertia.map_or(f64::INFINITY, |inertia| inertia * of.acceleration);
             let least = (limits.torque_error * of.torque).min(limits.acceleration_error * own);
             let push = guard.margin() * of.torque;
             Left { left: acted - need[j], tolerance: least + push + rigid + loose }
         }))
     }
 
-    /// Called once a cycle in current mode: finds the joint with the largest torque error, among those whose
-    /// error was too large for too long.
-    pub(super) fn torque_error(&mut self, left: &[Left; N]) -> Option<Cause> {
-        let limit = self.profile.reactions.torque_mode.cycles;
-        let mut worst: Option<(f64, usize)> = None;
-        for (j, (joint, of)) in self.joints.iter_mut().zip(left).enumerate() {
-            let share = of.left.abs() / of.tolerance;
-            let long = run(&mut joint.guarded.torque, beyond(share, 1.0), limit);
-            if long && worst.is_none_or(|(most, _)| beyond(share, most)) {
-                worst = Some((share, j));
-            }
-        }
-        let (_, j) = worst?;
-        let Left { left, tolerance } = *left.get(j)?;
-        Some(Cause::TorqueError(self.node(j), JointNumber::from_index(j), left, tolerance))
-    }
-
-    /// Called once a cycle in current mode: finds a joint that is off its path, or has another current than
-    /// commanded.
-    pub(super) fn not_obeying(&mut self, j: usize) -> Option<Cause> {
-        let (limits, node, number) =
-            (self.profile.reactions.torque_mode, self.node(j), JointNumber::from_index(j));
-        let (profile, joint) = (self.profile.joints.get(j)?, self.joints.get_mut(j)?);
-        if let Some([far, tolerance]) = joint.guarded.off.take()
-            && run(&mut joint.guarded.tracking, beyond(far, tolerance), limits.cycles)
+    /// Once a cycle: whether a joint is off its path, or has another current than commanded.
+    pub(super) fn not_obeying(&mut self, arm: &Arm<N>, j: usize) -> Option<Cause> {
+        let (limits, number) = (&arm.profile.reactions.torque_mode, JointNumber::from_index(j));
+        let (profile, joint) = (arm.profile.joints.get(j)?, arm.joints.get(j)?);
+        let guarded = self.joints.get_mut(j)?;
+        if let Some([far, tolerance]) = guarded.off.take()
+            && run(&mut guarded.tracking, beyond(far, tolerance), limits.cycles)
         {
-            return Some(Cause::OffPath(node, number, far, tolerance));
+            return Some(Cause::OffPath(profile.node, number, far, tolerance));
         }
         let error = joint.demand.error(joint.current);
         let wrong = beyond(error, limits.current_error * profile.current);
-        run(&mut joint.guarded.current, wrong, limits.cycles).then_some(Cause::CurrentError(
-            node,
+        let commanded = joint.current - error;
+        run(&mut guarded.current, wrong, limits.cycles).then_some(Cause::CurrentError(
+            profile.node,
             number,
             joint.current,
-            joint.current - error,
+            commanded,
         ))
     }
 }
@@ -298,7 +271,8 @@ impl<const N: usize> TorqueGuard<N> {
         of(self.torque(q, &rest, &unit)) - of(self.torque(q, &rest, &rest))
     }
 
-    /// Friction at a velocity: what of the torque without acceleration turns with it, N·m. Gravity and Coriolis forces do not.
+    /// Friction at a velocity: what of the torque without acceleration turns with it, N·m. Gravity and
+    /// Coriolis forces do not.
     fn friction(&self, q: &[f64; N], dq: &[f64; N]) -> [f64; N] {
         let forth = self.torque(q, dq, &[0.0; N]);
         let back = self.torque(q, &dq.map(|v| -v), &[0.0; N]);
