@@ -10,7 +10,7 @@
 use crate::explain::{Hypothesis, Open};
 use crate::options::{ExplainError, ExplainOptions};
 use powerball_identification::estimate::Folds;
-use powerball_identification::estimate::distribution::f_tail;
+use powerball_identification::estimate::distribution::chance_of_sum;
 use powerball_logs::log::Log;
 use powerball_logs::regression::{Data, RigidArm, Signals};
 
@@ -54,7 +54,7 @@ pub fn decide(
     let blocks = leads(&data, a, b);
     let lead = blocks.iter().sum::<f64>() + penalty;
     let held = leads(&other, a, b).iter().sum::<f64>();
-    let p_value = chance(&blocks, lead);
+    let p_value = chance_of_sum(&blocks, lead);
     // From here on `first` is the one that leads.
     let (first, second, sign) = if lead >= 0.0 { (a, b, 1.0) } else { (b, a, -1.0) };
     let (evidence, held_out) = (sign * lead, sign * held);
@@ -113,14 +113,6 @@ fn leads(data: &Data<'_>, a: &Hypothesis, b: &Hypothesis) -> Vec<f64> {
     (data.blocks.iter())
         .map(|block| block.rows.iter().enumerate().map(|(j, rows)| joint(j, rows)).sum())
         .collect()
-}
-
-/// Probability of a sum as far from zero by chance, from the spread of the blocks.
-fn chance(blocks: &[f64], lead: f64) -> f64 {
-    let n = blocks.len() as f64;
-    let mean = blocks.iter().sum::<f64>() / n;
-    let variance = blocks.iter().map(|b| (b - mean) * (b - mean)).sum::<f64>() * n / (n - 1.0);
-    if n < 4.0 || variance <= 0.0 { 1.0 } else { f_tail(lead * lead / variance, 1.0, n - 1.0) }
 }
 
 /// How much two models differ over what their own names explain, rms over rms, weighted by joint.

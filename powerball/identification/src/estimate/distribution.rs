@@ -9,6 +9,16 @@ pub fn f_tail(x: f64, d1: f64, d2: f64) -> f64 {
     incomplete_beta(d2 / (d2 + d1 * x), d2 / 2.0, d1 / 2.0)
 }
 
+/// The probability that a sum over independent blocks is as far from zero as `sum` by chance: Student's t, both sides, the
+/// variance from the blocks. 1 for fewer than four blocks.
+#[must_use]
+pub fn chance_of_sum(blocks: &[f64], sum: f64) -> f64 {
+    let n = blocks.len() as f64;
+    let mean = blocks.iter().sum::<f64>() / n;
+    let variance = blocks.iter().map(|b| (b - mean).powi(2)).sum::<f64>() * n / (n - 1.0);
+    if n < 4.0 || variance <= 0.0 { 1.0 } else { f_tail(sum * sum / variance, 1.0, n - 1.0) }
+}
+
 /// The 97.5 % quantile of Student's t with `d` degrees of freedom: half the width of a 95 % interval in
 /// standard errors.
 #[must_use]
@@ -126,6 +136,10 @@ mod tests {
         }
         // By numerical integration of the density.
         approx::assert_relative_eq!(t_critical(2e-5, 40.0), 4.835023895055, max_relative = 1e-8);
+        // Student's distribution with 4 degrees of freedom in closed form.
+        let blocks = [0.3, -0.1, 0.8, 0.5, 0.2];
+        approx::assert_relative_eq!(chance_of_sum(&blocks, 1.7), 0.086522779946, max_relative = 1e-8);
+        assert_eq!((chance_of_sum(&blocks[..3], 1.0), chance_of_sum(&[0.0; 9], 0.0)), (1.0, 1.0));
         assert_eq!(f_tail(-1.0, 1.0, 5.0), 1.0);
         assert_eq!(f_tail(f64::NAN, 1.0, 5.0), 1.0);
     }
