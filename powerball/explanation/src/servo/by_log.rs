@@ -20,8 +20,10 @@ const REFINED: usize = 3;
 const STEPS: usize = 20;
 /// Sizes that differ by less than this share of them are one change.
 const ALIKE: f64 = 0.3;
-/// Probability of a change that is none, and of one size that is taken for two: that of three standard errors of a normal
-/// number. A log is a few blocks that count as independent, and its standard error is as uncertain as these are few.
+/// Standard errors that a change must be away from none, where logs without one say how much sizes differ.
+const CLEAR: f64 = 3.0;
+/// The probability of as much of a normal number, for two sizes: a log is a few blocks that count as independent, and its
+/// standard error is as uncertain as these are few.
 const BY_CHANCE: f64 = 0.0027;
 
 /// What may differ in a log.
@@ -73,14 +75,14 @@ impl Size {
         self.after / self.before.max(f64::MIN_POSITIVE)
     }
 
-    /// Standard errors that differ by chance with probability [`BY_CHANCE`]: Student's t.
-    fn clear(&self) -> f64 {
+    /// Standard errors that two sizes differ by with probability [`BY_CHANCE`]: Student's t.
+    fn apart(&self) -> f64 {
         t_critical(BY_CHANCE, self.blocks.saturating_sub(1).max(1) as f64)
     }
 
     /// Whether it is away from none, next to how much logs without a change differ.
     fn is_clear(&self, change: Change, spread: f64) -> bool {
-        (self.value - change.none()).abs() > self.clear() * self.std.hypot(spread)
+        (self.value - change.none()).abs() > CLEAR * self.std.hypot(spread)
     }
 }
 
@@ -195,7 +197,7 @@ pub(super) fn groups(changes: &[Option<Change>], sizes: &[[Option<Size>; 2]]) ->
                 let share =
                     difference / (size.value - change.none()).abs().max((last.value - change.none()).abs());
                 let error = size.std.hypot(spread).hypot(last.std.hypot(spread));
-                difference > size.clear().max(last.clear()) * error && share > ALIKE
+                difference > size.apart().max(last.apart()) * error && share > ALIKE
             };
             match groups.last_mut() {
                 Some((of, logs)) if *of == change && !last.is_some_and(apart) => logs.push(k),
