@@ -477,7 +477,8 @@ fn datasets_of_lerobot_are_read_as_they_are() {
     assert!(asked(&folder, &degrees).contains("other columns"), "{}", asked(&folder, &degrees));
 }
 
-/// Goals and positions of two joints, simulated by MuJoCo (logs_data/so101/make.py): its constants come out, and nothing is named.
+/// Goals and positions of two joints, simulated by MuJoCo (logs_data/so101/make.py): its constants come out,
+/// and nothing is named.
 #[test]
 fn a_dataset_of_lerobot_gives_the_servos_of_its_arm() {
     let (out, of) = (folder("so101"), |name: &str| data("so101").join(name).display().to_string());

@@ -337,8 +337,8 @@ impl<'t, 'd> Writer<'t, 'd> {
         self.append("tendon", last, lines);
     }
 
-    /// Takes out what an earlier export wrote into the sections of a name: elements of some kinds, and comments. Returns
-    /// the last of the sections, and what was in.
+    /// Takes out what an earlier export wrote into the sections of a name: elements of some kinds, and
+    /// comments. Returns the last of the sections, and what was in.
     fn cleared(&mut self, section: &str, kinds: &[&str]) -> (Option<Node<'d, 't>>, Vec<Node<'d, 't>>) {
         let root = self.document.root_element();
         let sections: Vec<Node<'d, 't>> = root.children().filter(|n| n.has_tag_name(section)).collect();

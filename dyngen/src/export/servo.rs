@@ -1,5 +1,5 @@
-//! Identified position servos, as `powerball identify` writes them for logs without torque, in the form of MuJoCo's
-//! `<position>`: force = kp·(ctrl − q) − kv·q̇ within `forcerange`.
+//! Identified position servos, as `powerball identify` writes them for logs without torque, in the form of
+//! MuJoCo's `<position>`: force = kp·(ctrl − q) − kv·q̇ within `forcerange`.
 
 use super::edit::shortest;
 use super::known::Friction;

@@ -22,8 +22,8 @@ const STEPS: usize = 20;
 const ALIKE: f64 = 0.3;
 /// Standard errors that a change must be away from none, where logs without one say how much sizes differ.
 const CLEAR: f64 = 3.0;
-/// The probability of as much of a normal number, for two sizes: a log is a few blocks that count as independent, and its
-/// standard error is as uncertain as these are few.
+/// The probability of as much of a normal number, for two sizes: a log is a few blocks that count as
+/// independent, and its standard error is as uncertain as these are few.
 const BY_CHANCE: f64 = 0.0027;
 
 /// What may differ in a log.

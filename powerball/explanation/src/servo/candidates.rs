@@ -1,5 +1,5 @@
-//! What a model of servos may lack on all logs: each candidate is fitted with everything else, and must lower the error of
-//! simulated positions on the validation logs.
+//! What a model of servos may lack on all logs: each candidate is fitted with everything else, and must lower
+//! the error of simulated positions on the validation logs.
 
 use super::result::{ServoEffect, ServoRival};
 use crate::rule::Rule;
@@ -23,7 +23,8 @@ const FADES: f64 = 15.0;
 /// Something that a joint may have.
 pub(super) struct Candidate {
     name: &'static str,
-    /// What is fitted in addition, with the least value and where the search may begin; the scale is the first start.
+    /// What is fitted in addition, with the least value and where the search may begin; the scale is the
+    /// first start.
     free: Vec<(Constant, f64, &'static [f64])>,
     /// What is set and not fitted.
     set: Vec<(Constant, f64)>,
@@ -127,7 +128,8 @@ impl Candidate {
     }
 }
 
-/// Adds to a joint what it lacks, the candidate that lowers the held-out error most first, while one does by the rule.
+/// Adds to a joint what it lacks, the candidate that lowers the held-out error most first, while one does by
+/// the rule.
 pub(super) fn name(
     joint: &mut Joint<'_>,
     effects: &mut Vec<ServoEffect>,

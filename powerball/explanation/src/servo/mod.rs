@@ -206,7 +206,8 @@ fn report_odd(
     result.goal_error.push(rms(&goal));
 }
 
-/// The degrees of freedom of a standard error that is made of several, each with its count of numbers (Welch and Satterthwaite).
+/// The degrees of freedom of a standard error that is made of several, each with its count of numbers (Welch
+/// and Satterthwaite).
 fn freedom(parts: [(f64, usize); 3]) -> f64 {
     let all: f64 = parts.iter().map(|(std, _)| std * std).sum();
     let each = |(std, count): &(f64, usize)| std.powi(4) / count.saturating_sub(1).max(1) as f64;

@@ -1,5 +1,5 @@
-//! Logs of a servo with one thing that the base lacks, by another formulation than the simulation that is fitted: explicit
-//! steps of 20 µs, and a joint that rests while friction can hold it.
+//! Logs of a servo with one thing that the base lacks, by another formulation than the simulation that is
+//! fitted: explicit steps of 20 µs, and a joint that rests while friction can hold it.
 
 use super::tests::servos::{pendulum, point};
 use super::*;

@@ -152,8 +152,8 @@ fn how_often_masses_are_right() {
     println!("logs of the known mass that are named: {wrong} of {}", count * 2 * PATHS.len());
 }
 
-/// What is named on all logs of one mass, length and gain, and the position error on logs of the other mass, which had no part in it:
-/// with the first `most` candidates alone, and with all.
+/// What is named on all logs of one mass, length and gain, and the position error on logs of the other mass,
+/// which had no part in it: with the first `most` candidates alone, and with all.
 fn on_the_other_mass(measured: &Measured, own: (usize, f64, u32), most: usize) -> (Vec<&'static str>, f64) {
     let ((name, mass), other) = (MASSES[own.0], MASSES[1 - own.0]);
     let servos = ServoArm::new(&pendulum(own.1, &format!("kp = {}", own.2)), Some(&point(mass))).unwrap();

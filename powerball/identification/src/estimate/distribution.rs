@@ -9,8 +9,8 @@ pub fn f_tail(x: f64, d1: f64, d2: f64) -> f64 {
     incomplete_beta(d2 / (d2 + d1 * x), d2 / 2.0, d1 / 2.0)
 }
 
-/// The probability that a sum over independent blocks is as far from zero as `sum` by chance: Student's t, both sides, the
-/// variance from the blocks. 1 for fewer than four blocks.
+/// The probability that a sum over independent blocks is as far from zero as `sum` by chance: Student's t,
+/// both sides, the variance from the blocks. 1 for fewer than four blocks.
 #[must_use]
 pub fn chance_of_sum(blocks: &[f64], sum: f64) -> f64 {
     let n = blocks.len() as f64;

@@ -259,9 +259,9 @@ impl<'l> Problem<'l> {
         (fitted, free)
     }
 
-    /// The fit without a limit that the logs do not show: a limit is one more constant, which must gain more than chance does
-    /// by Schwarz's criterion (Annals of Statistics 6, 1978). Tried are a goal without a limit of its speed, and a torque at
-    /// full duty of which the logs use less.
+    /// The fit without a limit that the logs do not show: a limit is one more constant, which must gain more
+    /// than chance does by Schwarz's criterion (Annals of Statistics 6, 1978). Tried are a goal without a
+    /// limit of its speed, and a torque at full duty of which the logs use less.
     pub fn without_limits(self, fitted: Fitted, free: Vec<Free>) -> (Problem<'l>, Fitted, Vec<Free>) {
         let blocks = self.blocks() as f64;
         let most = |of: &Fitted| of.objective * blocks.powf(1.0 / blocks);
@@ -287,8 +287,8 @@ impl<'l> Problem<'l> {
         Some((without, values, free))
     }
 
-    /// With more torque at full duty, and all else as it is: the gain is smaller by as much, and where torques are shares of
-    /// that torque, they all are.
+    /// With more torque at full duty, and all else as it is: the gain is smaller by as much, and where
+    /// torques are shares of that torque, they all are.
     fn with_more_torque(&self, fitted: &Fitted, free: &[Free]) -> Option<Start<'l>> {
         /// Times as much.
         const MORE: f64 = 3.0;

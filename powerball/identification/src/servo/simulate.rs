@@ -4,7 +4,8 @@
 //! coulomb + load·½·|motor + rest| (what the gear carries between the two) + stribeck·exp(−|q̇|/stribeck_velocity), against the
 //! motion, and viscous·q̇ (Duclusaud et al., *Extended Friction Models for the Physics Simulation of Servo Actuators*, 2024).
 //!
-//! The torque at full duty follows the logged voltage where a supply is given, and Coulomb and viscous friction follow warmth.
+//! The torque at full duty follows the logged voltage where a supply is given, and Coulomb and viscous
+//! friction follow warmth.
 //!
 //! Velocities are those between the steps of positions (leapfrog, second order). What is proportional to q̇ is solved exactly.
 //! Dry friction brakes a joint until it stops, and beyond that holds it where it can: a joint sticks without chatter.
@@ -151,7 +152,8 @@ struct Drive {
 }
 
 impl Drive {
-    /// The velocity after a step. What is proportional to it is solved exactly for a force that is constant over the step.
+    /// The velocity after a step. What is proportional to it is solved exactly for a force that is constant
+    /// over the step.
     fn after(&self, v: f64, h: f64) -> f64 {
         let rate = h * self.brake / self.inertia;
         let (kept, push) = match rate > 1e-9 {
