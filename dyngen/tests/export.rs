@@ -163,3 +163,52 @@ fn a_mujoco_model_is_written_and_read_again() {
     let refusal = export::mjcf(MIXED, "arm.xml", &arm, &known, &Options::default()).unwrap_err().to_string();
     assert!(refusal.contains("'pan'") && refusal.contains("1.5 kg"), "{refusal}");
 }
+
+/// What `powerball identify` writes for position servos: kp·gain·torque and so on, in MuJoCo's terms.
+#[test]
+fn a_position_servo_is_written_as_mujocos() {
+    let one = |j: usize, more: &str| {
+        format!(
+            "{{\"joint\": {j}, \"absolute\": true, \"parameters\": [{{\"name\": \"torque\", \"value\": 3.0, \"std\": 0.1}}, \
+             {{\"name\": \"gain\", \"value\": 0.5, \"std\": 0.01}}, {{\"name\": \"kp\", \"value\": 16.0, \"std\": null, \
+             \"known\": true}}, {{\"name\": \"kd\", \"value\": 0.25, \"std\": null}}, {{\"name\": \"armature\", \"value\": \
+             0.03125, \"std\": 0.001}}, {{\"name\": \"viscous\", \"value\": 0.25, \"std\": 0.01}}, {{\"name\": \
+             \"back_emf\", \"value\": 0.5, \"std\": 0.02}}, {{\"name\": \"coulomb\", \"value\": 0.0625, \"std\": 0.001}}{more}]}}"
+        )
+    };
+    let load = ", {\"name\": \"load\", \"value\": 0.375, \"std\": 0.01}";
+    let all: Vec<String> = (1..5).map(|j| one(j, if j == 2 { load } else { "" })).collect();
+    let servos = format!("{{\"servo\": [{}]}}", all.join(", "));
+    let before = import::mjcf(MIXED, "arm.xml", &Options::default()).unwrap();
+    let values = scaled(&before);
+    let read = |servos: &str| Known::read(&before.arm, (&values, "v.json"), Some((servos, "s.json")));
+    let write = |text: &str, servos: &str| {
+        export::mjcf(text, "arm.xml", &before.arm, &read(servos).unwrap(), &Options::default()).unwrap()
+    };
+    let new = write(MIXED, &servos);
+    let position = "kp=\"24.0\" kv=\"0.375\" forcerange=\"-3.0 3.0\"";
+    assert_eq!(new.text.matches(position).count(), 4, "{}", new.text);
+    for words in ["armature=\"0.03125\"", "damping=\"0.75\"", "frictionloss=\"0.0625\""] {
+        assert_eq!(new.text.matches(words).count(), 4, "{words}\n{}", new.text);
+    }
+    assert!(new.notes.iter().any(|note| note.contains("load 0.375: friction for each")), "{:?}", new.notes);
+    // A second export takes the place of the first; a servo of the model itself is changed.
+    let section = |text: &str| text[text.find("<actuator>").unwrap()..].to_string();
+    assert_eq!(section(&write(&new.text, &servos).text), section(&new.text));
+    let name = "name=\"dyngen servo lift\"";
+    let own = new.text.replace(name, "name=\"lift\" dampratio=\"1\"").replace(position, "kp=\"5\"");
+    let changed = write(&own, &servos).text;
+    assert!(changed.contains("name=\"lift\"") && !changed.contains("dampratio") && !changed.contains(name));
+    assert_eq!(changed.matches("kp=\"24.0\"").count(), 4, "{changed}");
+    // A torque that no log reaches is no limit.
+    let hidden =
+        write(MIXED, &servos.replace("\"value\": 3.0, \"std\": 0.1", "\"value\": 3.0, \"std\": null"));
+    assert!(
+        !hidden.text.contains("forcerange=") && hidden.notes.iter().any(|n| n.contains("no log reaches"))
+    );
+    let shares = read(&servos.replace("\"absolute\": true", "\"absolute\": false")).unwrap_err();
+    assert!(shares.contains("s.json: the torques of joint 1 are shares"), "{shares}");
+    assert!(
+        read(&servos.replace("\"joint\": 3", "\"joint\": 7")).unwrap_err().contains("no servo for joint 3")
+    );
+}

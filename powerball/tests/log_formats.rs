@@ -9,7 +9,9 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use powerball::Log;
 use powerball::logs::log::{ColumnMap, Finding, ServoLog};
 use powerball::logs::tables::{Contents, JointState, McapWriter, read_contents};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 const JOINTS: &str = "joints = [\"shoulder\", \"elbow\"]\n";
 
@@ -473,6 +475,40 @@ fn datasets_of_lerobot_are_read_as_they_are() {
     // A file of another dataset among them.
     std::fs::copy(data("types.parquet"), folder.join("data/chunk-000/file-001.parquet")).unwrap();
     assert!(asked(&folder, &degrees).contains("other columns"), "{}", asked(&folder, &degrees));
+}
+
+/// Goals and positions of two joints, simulated by MuJoCo (logs_data/so101/make.py): its constants come out,
+/// and nothing is named.
+#[test]
+fn a_dataset_of_lerobot_gives_the_servos_of_its_arm() {
+    let (out, of) = (folder("so101"), |name: &str| data("so101").join(name).display().to_string());
+    let (arm, fit, validate) = (of("arm.toml"), of("fit"), of("validate"));
+    let run = |command: &str| {
+        let arguments = [command, "--arm", &arm, "--log", &fit, "--validate", &validate];
+        let mut call = Command::new(env!("CARGO_BIN_EXE_powerball"));
+        call.args(arguments).args(["--map", "q.unit = \"deg\"", "--json", "--out"]).arg(&out);
+        let output = call.output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()
+    };
+    let found = run("identify");
+    let truth = [("torque", 3.0), ("armature", 0.028), ("viscous", 0.6), ("delay", 0.03)];
+    for joint in found["servo"].as_array().unwrap() {
+        let of = |name: &str| {
+            let all = joint["parameters"].as_array().unwrap();
+            all.iter().find(|p| p["name"] == name).unwrap_or_else(|| panic!("{joint}"))["value"]
+                .as_f64()
+                .unwrap()
+        };
+        for (name, value) in truth {
+            assert!((of(name) / value - 1.0).abs() < 0.06, "{name}: {} {value}", of(name));
+        }
+        assert!((of("torque") * of("gain") / 17.8 - 1.0).abs() < 0.03, "{joint}");
+    }
+    let error = |of: &Value, j: usize| of["position_error"][j].as_f64().unwrap();
+    assert!((0..2).all(|j| error(&found["validate"], j) < 0.005), "{}", found["validate"]);
+    let explained = run("explain");
+    assert_eq!(explained["effects"], serde_json::json!([]), "{explained}");
 }
 
 // NumPy.

@@ -22,7 +22,8 @@ pub(super) struct Args {
     /// What `powerball identify` wrote, or values of every parameter of the arm.
     #[arg(long, value_name = "FILE.json")]
     values: PathBuf,
-    /// What `powerball identify` or `explain` wrote: damping and friction of the joints, and effects for MuJoCo.
+    /// What `powerball identify` or `explain` wrote: damping and friction of the joints, and for MuJoCo
+    /// effects, or position servos.
     #[arg(long, value_name = "FILE.json")]
     friction: Option<PathBuf>,
     /// Write damping too that is not larger than its own standard error; without this the original's stays.

@@ -1,5 +1,6 @@
 //! Identified values from their files: every link's parameters with their errors, and friction.
 
+use super::servo::{self, Servo};
 use super::term::{self, Term};
 use crate::arm::sum::parse_sum;
 use crate::arm::{Arm, Parameter, ParameterKind};
@@ -33,6 +34,8 @@ pub struct Known {
     pub friction: Option<Vec<Option<Friction>>>,
     /// Effects beyond friction.
     pub terms: Vec<Term>,
+    /// Position servos by joint, where the file has them.
+    pub servos: Option<Vec<Option<Servo>>>,
 }
 
 impl Known {
@@ -82,13 +85,17 @@ impl Known {
         }
         let words = words(arm, &json);
         let Some((text, file)) = friction else {
-            return Ok(Known { values: all, words, friction: None, terms: Vec::new() });
+            return Ok(Known { values: all, words, friction: None, terms: Vec::new(), servos: None });
         };
         let wrong = |what: String| format!("{file}: {what}");
         let json: Value = serde_json::from_str(text).map_err(|e| wrong(format!("not valid JSON: {e}")))?;
-        let friction = Some(read_friction(arm, &json).map_err(wrong)?);
+        let servos = servo::read(arm, &json).map_err(wrong)?;
+        let friction = match &servos {
+            Some(servos) => servos.iter().map(|servo| servo.as_ref().map(|servo| servo.friction)).collect(),
+            None => read_friction(arm, &json).map_err(wrong)?,
+        };
         let terms = term::read(arm, &json).map_err(wrong)?;
-        Ok(Known { values: all, words, friction, terms })
+        Ok(Known { values: all, words, friction: Some(friction), terms, servos })
     }
 }
 

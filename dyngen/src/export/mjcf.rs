@@ -5,6 +5,7 @@ use super::body::Body;
 use super::dcmotor::{self, Motor, Motors, Spring};
 use super::edit::{Edits, child, comment, escaped, indentation, shortest};
 use super::known::{Friction, Known};
+use super::servo::Servo;
 use super::share::{self, Share};
 use super::term::Term;
 use super::urdf::Exported;
@@ -68,6 +69,11 @@ pub fn mjcf(
         if !effects.motors.is_empty() {
             writer.name_joint(&joint.name);
         }
+        if let Some(servo) = known.servos.as_ref().and_then(|servos| servos[i].as_ref()) {
+            let left_out = servo.left_out.iter().map(|what| format!("joint '{}': {what}", joint.name));
+            actuators.left_out.extend(left_out);
+            writer.servo(&joint.name, servo, &mut actuators.servos);
+        }
         actuators.add(&joint.name, &turns, effects);
     }
     notes.extend(actuators.left_out.iter().map(|what| format!("left out: {what}")));
@@ -79,7 +85,9 @@ pub fn mjcf(
 /// The values of a joint, or of its motor's tendon, and the effects in addition to them.
 fn held(arm: &Arm, known: &Known, i: usize) -> (Held, Motors) {
     let rotor = known.values[11 * i + 10];
+    let servo = known.servos.as_ref().and_then(|servos| servos[i].as_ref());
     let armature = arm.joints[i].rotor_ratio.as_ref().map(|k| to_f64(k).powi(2) * rotor);
+    let armature = servo.map(|servo| servo.armature).or(armature);
     let mut friction = known.friction.as_ref().and_then(|f| f[i]);
     let terms: Vec<&Term> = known.terms.iter().filter(|term| term.link == i).collect();
     let mut effects = dcmotor::motors(arm.joints[i].kind, friction, &terms);
@@ -112,6 +120,8 @@ impl Held {
 #[derive(Default)]
 struct Actuators {
     motors: Vec<Placed>,
+    /// Position servos of joints that have none in the model.
+    servos: Vec<String>,
     left_out: Vec<String>,
 }
 
@@ -269,15 +279,45 @@ impl<'t, 'd> Writer<'t, 'd> {
         }
     }
 
-    /// Writes effects as passive actuators, in the place of those of an earlier export.
-    fn actuators(&mut self, Actuators { motors, left_out }: &Actuators) {
-        let (last, old) = self.cleared("actuator", "dcmotor");
+    /// Writes a servo into the model's own `<position>` of that joint, or as a new one into `more`.
+    fn servo(&mut self, joint: &str, servo: &Servo, more: &mut Vec<String>) {
+        let range = servo.force.map(|force| format!("{} {}", shortest(-force), shortest(force)));
+        let values =
+            [("kp", Some(shortest(servo.kp))), ("kv", Some(shortest(servo.kv))), ("forcerange", range)];
+        let values = values.into_iter().filter_map(|(key, value)| Some((key, value?)));
+        let root = self.document.root_element();
+        let mut all =
+            root.children().filter(|n| n.has_tag_name("actuator")).flat_map(|n| n.children()).filter(|n| {
+                let name = n.attribute("name").unwrap_or_default();
+                n.has_tag_name("position") && n.attribute("joint") == Some(joint) && !name.starts_with(OURS)
+            });
+        match all.next() {
+            Some(own) => {
+                values.for_each(|(key, value)| self.attribute(own, key, value));
+                // MuJoCo takes one of the two.
+                if let Some(ratio) = own.attribute_node("dampratio") {
+                    self.edits.replace(ratio.range(), "");
+                }
+            }
+            None => {
+                self.name_joint(joint);
+                let values: String = values.map(|(key, value)| format!(" {key}=\"{value}\"")).collect();
+                let joint = escaped(joint);
+                more.push(format!("<position name=\"{OURS}servo {joint}\" joint=\"{joint}\"{values}/>"));
+            }
+        }
+    }
+
+    /// Writes servos, and effects as passive actuators, in the place of those of an earlier export.
+    fn actuators(&mut self, Actuators { motors, servos, left_out }: &Actuators) {
+        let (last, old) = self.cleared("actuator", &["dcmotor", "position"]);
         let mut states = -(old.iter().filter(|node| node.attribute("lugre").is_some()).count() as i64);
-        if motors.is_empty() && left_out.is_empty() && states == 0 {
+        if motors.is_empty() && servos.is_empty() && left_out.is_empty() && states == 0 {
             return;
         }
         let mut lines: Vec<String> =
             left_out.iter().map(|what| comment(&format!("dyngen: left out: {what}"))).collect();
+        lines.extend(servos.iter().cloned());
         for (k, Placed { joint, turns, motor }) in motors.iter().enumerate() {
             states += i64::from(motor.has_state);
             lines.push(comment(&format!("dyngen: joint '{joint}': {}", motor.words)));
@@ -293,17 +333,18 @@ impl<'t, 'd> Writer<'t, 'd> {
 
     /// Writes motors that turn with several joints, in the place of those of an earlier export.
     fn tendons(&mut self, lines: &[String]) {
-        let (last, _) = self.cleared("tendon", "fixed");
+        let (last, _) = self.cleared("tendon", &["fixed"]);
         self.append("tendon", last, lines);
     }
 
-    /// Takes out what an earlier export wrote into the sections of a name: elements of one kind, and comments. Returns
-    /// the last of the sections, and what was in.
-    fn cleared(&mut self, section: &str, kind: &str) -> (Option<Node<'d, 't>>, Vec<Node<'d, 't>>) {
+    /// Takes out what an earlier export wrote into the sections of a name: elements of some kinds, and
+    /// comments. Returns the last of the sections, and what was in.
+    fn cleared(&mut self, section: &str, kinds: &[&str]) -> (Option<Node<'d, 't>>, Vec<Node<'d, 't>>) {
         let root = self.document.root_element();
         let sections: Vec<Node<'d, 't>> = root.children().filter(|n| n.has_tag_name(section)).collect();
         let ours = |n: &Node<'d, 't>| {
-            n.has_tag_name(kind) && n.attribute("name").is_some_and(|name| name.starts_with(OURS))
+            kinds.iter().any(|kind| n.has_tag_name(*kind))
+                && n.attribute("name").is_some_and(|name| name.starts_with(OURS))
                 || n.is_comment() && n.text().is_some_and(|text| text.trim_start().starts_with("dyngen: "))
         };
         let old: Vec<Node<'d, 't>> =

@@ -180,6 +180,7 @@ pub(super) mod tests {
             values: (0..arm.links()).flat_map(of_link).collect(),
             words: vec![Vec::new(); arm.links()],
             friction: Some((0..arm.links()).map(friction).collect()),
+            servos: None,
             terms: Vec::new(),
         }
     }

@@ -72,6 +72,10 @@ pub fn urdf(
     if !effects.is_empty() {
         writer.notes.push(format!("a URDF has no place for effects: {} are left out", effects.join(", ")));
     }
+    if known.servos.is_some() {
+        let what = "gains, limits and rotors of position servos are left out: a URDF has no place for them";
+        writer.notes.push(what.to_string());
+    }
     if (0..arm.links()).any(|i| known.values[11 * i + 10] != 0.0) {
         let what = "rotor inertias are left out: a URDF has no place for them".to_string();
         writer.notes.push(what);

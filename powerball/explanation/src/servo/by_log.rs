@@ -5,6 +5,7 @@
 //! what the same question gives on the other logs by chance.
 
 use crate::rule::Rule;
+use powerball_identification::estimate::distribution::t_critical;
 use powerball_identification::servo::constants::Constant;
 use powerball_identification::servo::fit::{Fitted, Free, errors, fit, objective, slopes};
 use powerball_identification::servo::{Joint, Problem, Role, standard_errors};
@@ -19,8 +20,11 @@ const REFINED: usize = 3;
 const STEPS: usize = 20;
 /// Sizes that differ by less than this share of them are one change.
 const ALIKE: f64 = 0.3;
-/// Standard errors that a change must be away from none.
+/// Standard errors that a change must be away from none, where logs without one say how much sizes differ.
 const CLEAR: f64 = 3.0;
+/// The probability of as much of a normal number, for two sizes: a log is a few blocks that count as
+/// independent, and its standard error is as uncertain as these are few.
+const BY_CHANCE: f64 = 0.0027;
 
 /// What may differ in a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +62,8 @@ pub(super) struct Size {
     pub value: f64,
     /// Its standard error within these logs.
     pub std: f64,
+    /// Blocks that count as independent.
+    pub blocks: usize,
     /// The objective without it and with it, rad².
     pub before: f64,
     pub after: f64,
@@ -67,6 +73,11 @@ impl Size {
     /// The share of the squared error that stays.
     pub(super) fn left(&self) -> f64 {
         self.after / self.before.max(f64::MIN_POSITIVE)
+    }
+
+    /// Standard errors that two sizes differ by with probability [`BY_CHANCE`]: Student's t.
+    fn apart(&self) -> f64 {
+        t_critical(BY_CHANCE, self.blocks.saturating_sub(1).max(1) as f64)
     }
 
     /// Whether it is away from none, next to how much logs without a change differ.
@@ -101,7 +112,13 @@ pub(super) fn size(problem: &Problem<'_>, change: Change) -> Option<Size> {
     let slopes = slopes(&asked, &best.values, &free);
     let std = standard_errors(&slopes, &best.errors, &free, problem.block())[0]?;
     let scale = if change == Change::Gain { unit } else { 1.0 };
-    Some(Size { value: best.values[0] / scale, std: std / scale, before, after: best.objective })
+    Some(Size {
+        value: best.values[0] / scale,
+        std: std / scale,
+        blocks: problem.blocks(),
+        before,
+        after: best.objective,
+    })
 }
 
 /// The errors of a problem with a change of a size.
@@ -180,7 +197,7 @@ pub(super) fn groups(changes: &[Option<Change>], sizes: &[[Option<Size>; 2]]) ->
                 let share =
                     difference / (size.value - change.none()).abs().max((last.value - change.none()).abs());
                 let error = size.std.hypot(spread).hypot(last.std.hypot(spread));
-                difference > CLEAR * error && share > ALIKE
+                difference > size.apart().max(last.apart()) * error && share > ALIKE
             };
             match groups.last_mut() {
                 Some((of, logs)) if *of == change && !last.is_some_and(apart) => logs.push(k),

@@ -5,7 +5,10 @@
 //! would bend everything else.
 
 mod by_log;
+mod candidates;
 mod result;
+#[cfg(test)]
+mod synthetic;
 #[cfg(test)]
 mod tests;
 
@@ -13,20 +16,14 @@ use crate::rule::Rule;
 use by_log::{Change, Size};
 use powerball_controller::JointNumber;
 use powerball_identification::IdentifyError;
-use powerball_identification::estimate::distribution::f_tail;
+use powerball_identification::estimate::distribution::{f_tail, t_quantile_975};
 use powerball_identification::servo::constants::Constant;
-use powerball_identification::servo::fit::{Free, errors, fit};
+use powerball_identification::servo::fit::errors;
 use powerball_identification::servo::{Joint, Problem, Role, ServoArm, rms};
 use powerball_logs::Progress;
 use powerball_logs::log::ServoLog;
 pub use result::{Both, Differs, ExplainedServos, LogResult, ServoEffect, ServoRival, ServoVerdict};
 use serde_json::json;
-
-/// What a model of servos may lack on all logs, with what it frees.
-const CANDIDATES: [(&str, &[Constant]); 2] =
-    [("load_friction", &[Constant::Load]), ("stribeck", &[Constant::Stribeck, Constant::StribeckVelocity])];
-/// Steps of the fit with a candidate.
-const STEPS: usize = 40;
 
 /// Explains logs of position servos: what they lack on all logs, and what single logs have.
 ///
@@ -87,120 +84,10 @@ fn explain_joint(
     let base = joint.problem.in_logs(&arm.body, logs, j);
     let base_validate = joint.problem.in_logs(&arm.body, validate, j);
     result.before.add(&errors(&base, &[]), &errors(&base_validate, &[]));
-    for _ in 0..CANDIDATES.len() {
-        let Some((next, effect)) = best_candidate(arm, &joint, held_out, j, rule, result) else { break };
-        joint = next;
-        result.effects.push(effect);
-    }
+    let all = candidates::all(&joint, arm);
+    candidates::name(&mut joint, &mut result.effects, all, (arm, held_out), rule);
     report_odd(result, arm, &joint, (logs, validate), &found, j);
     Ok(())
-}
-
-/// The candidate that lowers the held-out error most, where one does by the rule.
-fn best_candidate<'l>(
-    arm: &ServoArm,
-    joint: &Joint<'l>,
-    held_out: &[ServoLog],
-    j: usize,
-    rule: &Rule,
-    result: &ExplainedServos,
-) -> Option<(Joint<'l>, ServoEffect)> {
-    let number = JointNumber::from_index(j);
-    let own = |effect: &ServoEffect| effect.joints.contains(&number);
-    let named: Vec<&str> = result.effects.iter().filter(|e| own(e)).map(|e| e.effect).collect();
-    let blocks = |joint: &Joint<'_>| {
-        let problem = joint.problem.in_logs(&arm.body, held_out, j);
-        block_squares(&errors(&problem, &[]), problem.block())
-    };
-    let before = blocks(joint);
-    let mut tried: Vec<(Joint<'l>, &'static str, f64, f64)> = Vec::new();
-    for (name, constants) in CANDIDATES.iter().filter(|(name, _)| !named.contains(name)) {
-        let next = with(joint, constants);
-        let after = blocks(&next);
-        let left = after.iter().sum::<f64>() / before.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        tried.push((next, name, left, p_value(&before, &after)));
-    }
-    tried.sort_by(|a, b| a.2.total_cmp(&b.2));
-    let level = rule.family_wise / (CANDIDATES.len() * arm.body.dof()) as f64;
-    let mut tried = tried.into_iter();
-    let (best, name, left, p_value) = tried.next()?;
-    let is_sure = left <= 1.0 - rule.large_gain || p_value <= level;
-    if left > 1.0 - rule.least_gain || !is_sure {
-        return None;
-    }
-    let count = before.len() as f64 * best.problem.block() as f64;
-    let root = |squares: f64| (squares / count.max(1.0)).sqrt();
-    let total = before.iter().sum::<f64>();
-    let rivals: Vec<ServoRival> = tried
-        .map(|(_, other, share, _)| ServoRival {
-            effect: other.to_string(),
-            why_not: format!(
-                "leaves {:.0} % of the held-out squared error, not {:.0} %",
-                100.0 * share,
-                100.0 * left
-            ),
-        })
-        .collect();
-    let constants =
-        CANDIDATES.iter().find(|(own, _)| *own == name).map_or(&[][..], |(_, constants)| *constants);
-    let mut parameters = serde_json::Map::new();
-    for constant in constants {
-        let key = if *constant == Constant::Load { "coefficient" } else { constant.name() };
-        parameters.insert(key.to_string(), json!(best.problem.constants.of(*constant)));
-    }
-    let effect = ServoEffect {
-        effect: name,
-        joints: vec![number],
-        parameters,
-        rms_before: vec![root(total)],
-        rms_after: vec![root(left * total)],
-        p_value,
-        probability: 1.0 - p_value,
-        logs: Vec::new(),
-        leftover: left,
-        rivals,
-    };
-    Some((best, effect))
-}
-
-/// A joint with more constants free, from where it is.
-fn with<'l>(joint: &Joint<'l>, constants: &[Constant]) -> Joint<'l> {
-    let torque = joint.problem.constants.of(Constant::Torque);
-    let (mut values, mut free) = (joint.fitted.values.clone(), joint.free.clone());
-    let mut roles = joint.problem.roles.clone();
-    for constant in constants {
-        let (start, least) = match constant {
-            Constant::Load => (0.1, 0.0),
-            Constant::StribeckVelocity => (0.1, 5e-3),
-            _ => (0.02 * torque, 0.0),
-        };
-        roles.push(Role::Constant(*constant));
-        values.push(start);
-        free.push(Free { scale: start, least });
-    }
-    let mut problem = joint.problem.asking(roles);
-    let fitted = fit(&problem, &values, &free, STEPS);
-    let (constants, inertial, _) = problem.at(&fitted.values);
-    (problem.constants, problem.inertial) = (constants, inertial);
-    let std = vec![None; free.len()];
-    Joint { problem, fitted, free, std }
-}
-
-/// Sums of squared errors of blocks that count as independent, rad².
-fn block_squares(errors: &[Vec<f64>], block: usize) -> Vec<f64> {
-    errors.iter().flat_map(|own| own.chunks(block.max(1))).map(|b| b.iter().map(|r| r * r).sum()).collect()
-}
-
-/// The probability that blocks improve so much by chance: their mean change over its standard error, one side of Student's t.
-fn p_value(before: &[f64], after: &[f64]) -> f64 {
-    let changes: Vec<f64> = before.iter().zip(after).map(|(b, a)| b - a).collect();
-    let n = changes.len() as f64;
-    let mean = changes.iter().sum::<f64>() / n.max(1.0);
-    let variance = changes.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    if mean <= 0.0 || variance <= 0.0 {
-        return 1.0;
-    }
-    0.5 * f_tail(mean.powi(2) / (variance / n), 1.0, n - 1.0)
 }
 
 /// What single logs have on a joint.
@@ -277,17 +164,19 @@ fn report_odd(
         let change = *change;
         let Some((size, squares)) = odd.size(change, own, logs.len()) else { continue };
         let spread = by_log::spread(&odd.sizes, &is_odd, change) / (own.len() as f64).sqrt();
-        let std = size.std.hypot(spread).hypot(between(&odd.sizes, own, change));
+        let between = between(&odd.sizes, own, change);
+        let std = size.std.hypot(spread).hypot(between);
         let before = rms_of(&left, own);
         let mut with = squares.into_iter();
         own.iter().for_each(|k| left[*k] = with.by_ref().take(left[*k].len()).collect());
         let blocks: usize = own.iter().map(|k| odd.each[*k].blocks()).sum();
-        let freedom = blocks.saturating_sub(1).max(1) as f64;
+        let usual = is_odd.iter().filter(|odd| !**odd).count();
+        let freedom = freedom([(size.std, blocks), (spread, usual), (between, own.len())]);
         let p_value = f_tail(((size.value - change.none()) / std).powi(2), 1.0, freedom);
         let effect = ServoEffect {
             effect: change.name(),
             joints: vec![number],
-            parameters: parameters(arm, joint, change, (size.value, std), own.len()),
+            parameters: parameters(arm, joint, change, (size.value, std, freedom), own.len()),
             rms_before: vec![before],
             rms_after: vec![rms_of(&left, own)],
             p_value,
@@ -317,6 +206,14 @@ fn report_odd(
     result.goal_error.push(rms(&goal));
 }
 
+/// The degrees of freedom of a standard error that is made of several, each with its count of numbers (Welch
+/// and Satterthwaite).
+fn freedom(parts: [(f64, usize); 3]) -> f64 {
+    let all: f64 = parts.iter().map(|(std, _)| std * std).sum();
+    let each = |(std, count): &(f64, usize)| std.powi(4) / count.saturating_sub(1).max(1) as f64;
+    (all * all / parts.iter().map(each).sum::<f64>().max(f64::MIN_POSITIVE)).max(1.0)
+}
+
 /// How far single logs of those that have a change are from each other, as the error of their mean.
 fn between(sizes: &[[Option<Size>; 2]], own: &[usize], change: Change) -> f64 {
     let values: Vec<f64> = own.iter().filter_map(|k| Some(sizes[*k][change as usize]?.value)).collect();
@@ -336,11 +233,12 @@ fn parameters(
     arm: &ServoArm,
     joint: &Joint<'_>,
     change: Change,
-    (value, std): (f64, f64),
+    (value, std, freedom): (f64, f64, f64),
     logs: usize,
 ) -> serde_json::Map<String, serde_json::Value> {
     let absolute = arm.known(joint.problem.joint).is_absolute();
-    let interval = [value - 1.96 * std, value + 1.96 * std];
+    let half = t_quantile_975(freedom) * std;
+    let interval = [value - half, value + half];
     let of = match change {
         Change::Payload if absolute => json!({"mass": value, "mass_std": std, "mass_interval": interval,
             "com": arm.tool, "start_time": vec![0.0; logs]}),

@@ -23,6 +23,14 @@ pub enum Constant {
     Stribeck,
     /// Speed at which that has fallen to a third.
     StribeckVelocity,
+    /// Supply for which the torque at full duty holds: where it is above 0, that follows the logged voltage.
+    Supply,
+    /// Change of Coulomb and viscous friction, as a share of it when cold: when warm, or over 10 K.
+    Warmth,
+    /// Time in which the joint becomes warm; 0 where friction follows the logged temperature.
+    WarmthTime,
+    /// Logged temperature at which friction is as the other constants have it.
+    Cold,
     /// Duty for an error of 1 rad at kp = 1.
     Gain,
     /// Errors below this do nothing.
@@ -42,12 +50,12 @@ pub enum Constant {
 }
 
 use Constant::{
-    Armature, BackEmf, Coulomb, DeadZone, Delay, Gain, Kd, Ki, Kp, Load, PwmLimit, SpeedLimit, Stribeck,
-    StribeckVelocity, Torque, Viscous, Zero,
+    Armature, BackEmf, Cold, Coulomb, DeadZone, Delay, Gain, Kd, Ki, Kp, Load, PwmLimit, SpeedLimit,
+    Stribeck, StribeckVelocity, Supply, Torque, Viscous, Warmth, WarmthTime, Zero,
 };
 
 /// How many there are.
-pub const COUNT: usize = 17;
+pub const COUNT: usize = 21;
 
 /// All of them in order, with their names and units; those of the second list are in torques.
 pub const ALL: [(Constant, &str, &str); COUNT] = [
@@ -60,6 +68,10 @@ pub const ALL: [(Constant, &str, &str); COUNT] = [
     (Load, "load", "1"),
     (Stribeck, "stribeck", "N·m"),
     (StribeckVelocity, "stribeck_velocity", "rad/s"),
+    (Supply, "supply", "V"),
+    (Warmth, "warmth", "1"),
+    (WarmthTime, "warmth_time", "s"),
+    (Cold, "cold", "°C"),
     (Gain, "gain", "1/rad"),
     (DeadZone, "dead_zone", "rad"),
     (Delay, "delay", "s"),
@@ -77,6 +89,12 @@ impl Constant {
         ALL[self as usize].1
     }
 
+    /// Whether it is a torque, or one for each rad/s or rad/s².
+    #[must_use]
+    pub fn is_torque(self) -> bool {
+        matches!(self, Torque | BackEmf | Armature | Coulomb | Viscous | Stribeck)
+    }
+
     /// Its unit. Where nothing says how large torques are, they are shares of the torque at full duty.
     #[must_use]
     pub fn unit(self, absolute: bool) -> &'static str {
@@ -86,12 +104,6 @@ impl Constant {
             (false, Armature) => "s² (torque at full duty)",
             _ => ALL[self as usize].2,
         }
-    }
-
-    /// Whether it may be negative.
-    #[must_use]
-    pub fn is_signed(self) -> bool {
-        self == Zero
     }
 }
 

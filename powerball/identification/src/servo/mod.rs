@@ -21,7 +21,7 @@ use crate::identify::IdentifyError;
 use constants::{ALL, Constant, Found};
 use dyngen::arm::JointKind;
 use dyngen::{Arm, SetKind, Values};
-use fit::{Fitted, Free, errors, objective, slopes};
+use fit::{Fitted, Free, errors, slopes};
 use powerball_controller::JointNumber;
 use powerball_logs::Progress;
 use powerball_logs::log::ServoLog;
@@ -123,21 +123,8 @@ impl<'l> Joint<'l> {
     /// Fits what is free in a problem.
     #[must_use]
     pub fn solve(mut problem: Problem<'l>) -> Joint<'l> {
-        let (mut fitted, mut free) = problem.solve();
-        // A limit that is never reached is none.
-        let limit = problem.roles.iter().position(|role| *role == Role::Constant(Constant::SpeedLimit));
-        if let Some(at) = limit {
-            let mut values = fitted.values.clone();
-            values[at] = f64::INFINITY;
-            let errors = errors(&problem, &values);
-            if objective(&errors) <= fitted.objective * (1.0 + 1e-6) {
-                problem.constants.set(Constant::SpeedLimit, f64::INFINITY);
-                problem.roles.remove(at);
-                free.remove(at);
-                values.remove(at);
-                fitted = Fitted { objective: objective(&errors), values, errors };
-            }
-        }
+        let (fitted, free) = problem.solve();
+        let (problem, fitted, free) = problem.without_limits(fitted, free);
         let slopes = slopes(&problem, &fitted.values, &free);
         let std = standard_errors(&slopes, &fitted.errors, &free, problem.block());
         Joint { problem, fitted, free, std }

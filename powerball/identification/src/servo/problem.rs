@@ -86,13 +86,24 @@ fn tracks<'l>(arm: &RigidArm, logs: &'l [ServoLog], joint: usize) -> (Vec<Track<
         all.extend(bodies(arm, log, joint, &pieces));
         for own in pieces {
             let on = log.enabled.as_ref().map(|on| &on[joint][own.clone()]);
-            let (t, q, goal) = (&log.t[own.clone()], &log.q[joint][own.clone()], &log.goal[joint][own]);
-            tracks.push(Track { t, q, goal, on });
+            let part = |signals: &'l Vec<Vec<f64>>| &signals[joint][own.clone()];
+            tracks.push(Track {
+                t: &log.t[own.clone()],
+                clock: log.clock,
+                q: part(&log.q),
+                goal: part(&log.goal),
+                on,
+                volts: log.volts.as_ref().map(part),
+                temperature: log.temperature.as_ref().map(part),
+            });
             of.push(k);
         }
     }
     (tracks, all, of)
 }
+
+/// A problem with the values at which a fit begins, and their scales.
+type Start<'l> = (Problem<'l>, Vec<f64>, Vec<Free>);
 
 fn is_inertial(role: &Role) -> bool {
     matches!(role, Role::Inertial(_))
@@ -248,6 +259,58 @@ impl<'l> Problem<'l> {
         (fitted, free)
     }
 
+    /// The fit without a limit that the logs do not show: a limit is one more constant, which must gain more
+    /// than chance does by Schwarz's criterion (Annals of Statistics 6, 1978). Tried are a goal without a
+    /// limit of its speed, and a torque at full duty of which the logs use less.
+    pub fn without_limits(self, fitted: Fitted, free: Vec<Free>) -> (Problem<'l>, Fitted, Vec<Free>) {
+        let blocks = self.blocks() as f64;
+        let most = |of: &Fitted| of.objective * blocks.powf(1.0 / blocks);
+        let mut own = (self, fitted, free);
+        for without in [Problem::without_speed_limit, Problem::with_more_torque] {
+            let Some((mut problem, values, free)) = without(&own.0, &own.1, &own.2) else { continue };
+            let refitted = fit(&problem, &values, &free, FIRST_STEPS);
+            if refitted.objective <= most(&own.1) {
+                (problem.constants, problem.inertial, _) = problem.at(&refitted.values);
+                own = (problem, refitted, free);
+            }
+        }
+        own
+    }
+
+    /// With a goal that moves as fast as it is logged.
+    fn without_speed_limit(&self, fitted: &Fitted, free: &[Free]) -> Option<Start<'l>> {
+        let at = self.roles.iter().position(|role| *role == Role::Constant(Constant::SpeedLimit))?;
+        let (mut without, mut values, mut free) = (self.clone(), fitted.values.clone(), free.to_vec());
+        without.roles.remove(at);
+        without.constants.set(Constant::SpeedLimit, f64::INFINITY);
+        (values.remove(at), free.remove(at));
+        Some((without, values, free))
+    }
+
+    /// With more torque at full duty, and all else as it is: the gain is smaller by as much, and where
+    /// torques are shares of that torque, they all are.
+    fn with_more_torque(&self, fitted: &Fitted, free: &[Free]) -> Option<Start<'l>> {
+        /// Times as much.
+        const MORE: f64 = 3.0;
+        let is_free = |constant| self.roles.contains(&Role::Constant(constant));
+        let in_shares = self.roles.iter().any(is_inertial) && !is_free(Constant::Torque);
+        if !is_free(Constant::Gain) || !(is_free(Constant::Torque) || in_shares) {
+            return None;
+        }
+        let factor = |role: &Role| match role {
+            Role::Constant(Constant::Torque) => MORE,
+            Role::Constant(Constant::Gain) => 1.0 / MORE,
+            Role::Constant(own) if in_shares && own.is_torque() => 1.0 / MORE,
+            Role::Inertial(_) if in_shares => 1.0 / MORE,
+            _ => 1.0,
+        };
+        let factors: Vec<f64> = self.roles.iter().map(factor).collect();
+        let values = fitted.values.iter().zip(&factors).map(|(value, factor)| value * factor).collect();
+        let scaled =
+            |(own, factor): (&Free, &f64)| Free { scale: own.scale * factor, least: own.least * factor };
+        Some((self.clone(), values, free.iter().zip(&factors).map(scaled).collect()))
+    }
+
     /// Where the search begins: scales from how fast the joint moves and the torque of its bodies, on a grid of gain, delay and
     /// torque, or of inertia where nothing says how large torques are.
     fn starts(&self) -> Vec<(Vec<f64>, Vec<Free>)> {
@@ -256,7 +319,7 @@ impl<'l> Problem<'l> {
         let kp = self.constants.of(Constant::Kp);
         let is_free = |c| self.roles.contains(&Role::Constant(c));
         let pick = |c, many: &[f64]| if is_free(c) { many.to_vec() } else { vec![self.constants.of(c)] };
-        let torques: Vec<f64> = pick(Constant::Torque, &[1.5, 4.0, 10.0].map(|x| x * heaviest));
+        let torques: Vec<f64> = pick(Constant::Torque, &[1.5, 4.0, 10.0, 40.0, 160.0].map(|x| x * heaviest));
         let inertias: &[f64] = if self.roles.iter().any(is_inertial) { &[0.01, 0.03, 0.1] } else { &[0.03] };
         let mut starts = Vec::new();
         for delay in pick(Constant::Delay, &[0.01, 0.03, 0.06]) {

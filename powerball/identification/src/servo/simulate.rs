@@ -4,6 +4,9 @@
 //! coulomb + load·½·|motor + rest| (what the gear carries between the two) + stribeck·exp(−|q̇|/stribeck_velocity), against the
 //! motion, and viscous·q̇ (Duclusaud et al., *Extended Friction Models for the Physics Simulation of Servo Actuators*, 2024).
 //!
+//! The torque at full duty follows the logged voltage where a supply is given, and Coulomb and viscous
+//! friction follow warmth.
+//!
 //! Velocities are those between the steps of positions (leapfrog, second order). What is proportional to q̇ is solved exactly.
 //! Dry friction brakes a joint until it stops, and beyond that holds it where it can: a joint sticks without chatter.
 
@@ -16,18 +19,49 @@ pub const STEP: f64 = 2.5e-3;
 const ROUNDING: f64 = 1e-6;
 /// Samples over which the first velocity is taken.
 const FIRST: usize = 4;
+/// A change by warmth is one over 10 K.
+const TEN: f64 = 10.0;
+/// Warmth leaves at least this share of friction.
+const LEAST_EASE: f64 = 0.05;
 
 /// One joint along one piece of a log.
 #[derive(Clone, Copy, Debug)]
 pub struct Track<'l> {
     /// Rising times, s.
     pub t: &'l [f64],
+    /// Seconds to add to them for the time since the joint was cold.
+    pub clock: f64,
     /// Measured positions, rad: the first one is where the simulation begins.
     pub q: &'l [f64],
     /// Set-points, rad.
     pub goal: &'l [f64],
     /// Whether the drive is switched on; always where it is not there.
     pub on: Option<&'l [bool]>,
+    /// Voltage of the drive, V, where it is logged; not a number where a sample has none.
+    pub volts: Option<&'l [f64]>,
+    /// Temperature, °C, where it is logged.
+    pub temperature: Option<&'l [f64]>,
+}
+
+impl Track<'_> {
+    /// The torque at full duty as a share of that at the given supply.
+    fn fullness(&self, k: usize, c: &Constants) -> f64 {
+        let supply = c.of(Constant::Supply);
+        let volts = self.volts.map(|volts| volts[k]).filter(|volts| supply > 0.0 && volts.is_finite());
+        volts.map_or(1.0, |volts| volts / supply)
+    }
+
+    /// Coulomb and viscous friction as a share of that when cold.
+    fn ease(&self, k: usize, c: &Constants) -> f64 {
+        let (change, time) = (c.of(Constant::Warmth), c.of(Constant::WarmthTime));
+        let by_temperature = |temperature: &[f64]| (temperature[k] - c.of(Constant::Cold)) / TEN;
+        let warm = match time > 0.0 {
+            true => Some(-(-(self.clock + self.t[k]) / time).exp_m1()),
+            false => self.temperature.map(by_temperature),
+        };
+        let warm = warm.filter(|warm| change != 0.0 && warm.is_finite());
+        warm.map_or(1.0, |warm| (1.0 + change * warm).max(LEAST_EASE))
+    }
 }
 
 /// The positions of the simulated joint at the times of a track, rad. What it moves is one entry, or one a sample.
@@ -42,9 +76,13 @@ pub fn simulate(track: &Track<'_>, moved: &[Moved], constants: &Constants) -> Ve
         let (from, to) = (track.t[k - 1], track.t[k]);
         let steps = ((to - from) / STEP - ROUNDING).ceil().max(1.0);
         let h = (to - from) / steps;
-        let moved = moved.get(k - 1).unwrap_or(&moved[0]);
+        let here = Here {
+            moved: moved.get(k - 1).unwrap_or(&moved[0]),
+            fullness: track.fullness(k - 1, constants),
+            ease: track.ease(k - 1, constants),
+        };
         for s in 0..steps as usize {
-            joint.step(track, moved, constants, from + h * s as f64, h);
+            joint.step(track, &here, constants, from + h * s as f64, h);
         }
         out.push(joint.q);
     }
@@ -89,12 +127,47 @@ fn goal_at(track: &Track<'_>, cursor: &mut usize, time: f64) -> f64 {
     }
 }
 
+/// What holds from one sample to the next.
+struct Here<'m> {
+    moved: &'m Moved,
+    fullness: f64,
+    ease: f64,
+}
+
 /// Where a joint and its drive are.
 struct Joint {
     q: f64,
     v: f64,
     integral: f64,
     cursor: usize,
+}
+
+/// What drives a motor through a step, and what brakes it.
+struct Drive {
+    inertia: f64,
+    force: f64,
+    /// Torque for each rad/s.
+    brake: f64,
+    dry: f64,
+}
+
+impl Drive {
+    /// The velocity after a step. What is proportional to it is solved exactly for a force that is constant
+    /// over the step.
+    fn after(&self, v: f64, h: f64) -> f64 {
+        let rate = h * self.brake / self.inertia;
+        let (kept, push) = match rate > 1e-9 {
+            true => ((-rate).exp(), -(-rate).exp_m1() / self.brake),
+            false => (1.0, h / self.inertia),
+        };
+        let way = if v == 0.0 { self.force.signum() } else { v.signum() };
+        let next = kept * v + push * (self.force - way * self.dry);
+        if next * way >= 0.0 {
+            return next;
+        }
+        // It stops within the step, and in what is left of it goes where the force exceeds friction.
+        next / (next - v) * push * self.force.signum() * (self.force.abs() - self.dry).max(0.0)
+    }
 }
 
 impl Joint {
@@ -105,34 +178,24 @@ impl Joint {
         Joint { q: track.q[0], v, integral: 0.0, cursor: 0 }
     }
 
-    fn step(&mut self, track: &Track<'_>, moved: &Moved, c: &Constants, time: f64, h: f64) {
+    fn step(&mut self, track: &Track<'_>, here: &Here<'_>, c: &Constants, time: f64, h: f64) {
         let of = |constant| c.of(constant);
-        let seen = time - of(Constant::Delay);
-        let goal = goal_at(track, &mut self.cursor, seen);
+        let goal = goal_at(track, &mut self.cursor, time - of(Constant::Delay));
         let is_on = track.on.is_none_or(|on| on[self.cursor]);
-        let rest = moved.rest(self.q + of(Constant::Zero));
-        let inertia = moved.inertia + of(Constant::Armature);
+        let rest = here.moved.rest(self.q + of(Constant::Zero));
         let (motor, back_emf) = match is_on {
-            true => (of(Constant::Torque) * self.duty(c, goal, h), of(Constant::BackEmf)),
+            true => (of(Constant::Torque) * here.fullness * self.duty(c, goal, h), of(Constant::BackEmf)),
             false => (0.0, 0.0),
         };
-        // What is proportional to the velocity is solved exactly for a force that is constant over the step.
-        let brake = back_emf + of(Constant::Viscous);
-        let rate = h * brake / inertia;
-        let (kept, push) =
-            if rate > 1e-9 { ((-rate).exp(), -(-rate).exp_m1() / brake) } else { (1.0, h / inertia) };
-        let force = motor - rest;
-        let dry = of(Constant::Coulomb)
-            + of(Constant::Load) * 0.5 * (motor - back_emf * self.v + rest).abs()
-            + of(Constant::Stribeck) * (-(self.v / of(Constant::StribeckVelocity)).abs()).exp();
-        let way = if self.v == 0.0 { force.signum() } else { self.v.signum() };
-        let next = kept * self.v + push * (force - way * dry);
-        self.v = if next * way >= 0.0 {
-            next
-        } else {
-            // It stops within the step, and in what is left of it goes where the force exceeds friction.
-            next / (next - self.v) * push * force.signum() * (force.abs() - dry).max(0.0)
+        let drive = Drive {
+            inertia: here.moved.inertia + of(Constant::Armature),
+            force: motor - rest,
+            brake: back_emf + here.ease * of(Constant::Viscous),
+            dry: here.ease * of(Constant::Coulomb)
+                + of(Constant::Load) * 0.5 * (motor - back_emf * self.v + rest).abs()
+                + of(Constant::Stribeck) * (-(self.v / of(Constant::StribeckVelocity)).abs()).exp(),
         };
+        self.v = drive.after(self.v, h);
         self.q += h * self.v;
     }
 

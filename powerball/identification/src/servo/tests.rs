@@ -92,7 +92,15 @@ fn steps_of_milliseconds_are_as_good_as_steps_of_microseconds() {
     for (log, most) in synthetic(&arm).iter().zip([5e-4, 5e-4, 2e-3]) {
         let body = &body::bodies(&servos.body, log, 0, &log.pieces)[0];
         let on = log.enabled.as_ref().map(|on| on[0].as_slice());
-        let track = Track { t: &log.t, q: &log.q[0], goal: &log.goal[0], on };
+        let track = Track {
+            t: &log.t,
+            clock: 0.0,
+            q: &log.q[0],
+            goal: &log.goal[0],
+            on,
+            volts: None,
+            temperature: None,
+        };
         let simulated = simulate(&track, &body.with(servos.values.as_deref().unwrap()), &truth());
         let error = rms(&[simulated.iter().zip(&log.q[0]).map(|(s, q)| s - q).collect()]);
         assert!(error < most, "{}: {error} rad", log.file);
@@ -145,7 +153,8 @@ fn closed_forms_are_met() {
     let bodies = body::bodies(&arm.body, &log, 0, &log.pieces);
     let moved = bodies[0].with(arm.values.as_deref().unwrap());
     let off = vec![false; t.len()];
-    let swing = Track { t: &t, q: &rest, goal: &still, on: Some(&off) };
+    let swing =
+        Track { t: &t, clock: 0.0, q: &rest, goal: &still, on: Some(&off), volts: None, temperature: None };
     let c = Constants::ideal().with(Constant::Armature, 0.02);
     let simulated = simulate(&swing, &moved, &c);
     // (ml² + J)/(mgl), half a period from one side to the other.
@@ -155,7 +164,7 @@ fn closed_forms_are_met() {
     let held = simulate(&swing, &moved, &c.with(Constant::Coulomb, 0.06));
     assert!(held.iter().all(|q| (q - 0.05).abs() < 1e-12), "0.047 N·m do not move 0.06 N·m of friction");
     let far = vec![1e3; t.len()];
-    let fast = Track { t: &t, q: &rest, goal: &far, on: None };
+    let fast = Track { t: &t, clock: 0.0, q: &rest, goal: &far, on: None, volts: None, temperature: None };
     let c = c.with(Constant::Torque, 20.0).with(Constant::BackEmf, 2.0);
     let run = simulate(&fast, &[body::Moved { inertia: 0.01, ..Default::default() }], &c);
     assert!(((run[1999] - run[1000]) / 0.999 - 10.0).abs() < 1e-6);

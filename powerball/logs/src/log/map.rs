@@ -345,22 +345,27 @@ fn factor(key: &str, unit: &str) -> Option<f64> {
 /// Where the spans of `t` do not overlap, `t` is a common clock already. Otherwise the logs were recorded in
 /// the given order, one right after the other.
 pub fn common_clock(logs: &mut [Log]) {
-    let span = |log: &Log| (log.t.first().copied().unwrap_or(0.0), log.t.last().copied().unwrap_or(0.0));
-    let mut spans: Vec<(f64, f64)> = logs.iter().map(span).collect();
-    spans.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let start = spans.first().map_or(0.0, |s| s.0);
-    if spans.windows(2).all(|pair| pair[0].1 <= pair[1].0) {
-        for log in logs {
-            log.clock = -start;
-        }
-        return;
+    let clocks = clocks(logs.iter().map(|log| log.t.as_slice()));
+    logs.iter_mut().zip(clocks).for_each(|(log, clock)| log.clock = clock);
+}
+
+/// What is added to the times of each log, s.
+pub(super) fn clocks<'t>(times: impl Iterator<Item = &'t [f64]>) -> Vec<f64> {
+    let span = |t: &[f64]| (t.first().copied().unwrap_or(0.0), t.last().copied().unwrap_or(0.0));
+    let spans: Vec<(f64, f64)> = times.map(span).collect();
+    let mut sorted = spans.clone();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let start = sorted.first().map_or(0.0, |s| s.0);
+    if sorted.windows(2).all(|pair| pair[0].1 <= pair[1].0) {
+        return vec![-start; spans.len()];
     }
     let mut end = 0.0;
-    for log in logs {
-        let (first, last) = span(log);
-        log.clock = end - first;
+    let after = |(first, last): (f64, f64)| {
+        let clock = end - first;
         end += last - first;
-    }
+        clock
+    };
+    spans.into_iter().map(after).collect()
 }
 
 // Torques whose time stamps are known to be off.

@@ -2,7 +2,7 @@
 
 use super::columns::{Asked, constants, group};
 use super::headers::{self, Headers};
-use super::map::ColumnMap;
+use super::map::{ColumnMap, clocks};
 use super::read::{Samples, read_asked};
 use super::{Doubt, Finding, LogError};
 use crate::tables::{Format, Place, RowSink, columnar, is_address, read_dataset, text};
@@ -34,6 +34,8 @@ pub struct ServoLog {
     pub pieces: Vec<Range<usize>>,
     /// What in its signals makes every result useless as it stands.
     pub doubts: Vec<Doubt>,
+    /// Seconds to add to `t` for a clock that runs through all logs.
+    pub clock: f64,
 }
 
 impl ServoLog {
@@ -73,7 +75,6 @@ impl ServoLog {
         };
         Ok(ServoLog {
             file: log.file,
-            t: log.t,
             q: log.q,
             goal: log.torque,
             temperature: log.temperature,
@@ -81,8 +82,17 @@ impl ServoLog {
             load,
             enabled: enabled.map(on),
             pieces: log.pieces,
+            clock: -log.t.first().copied().unwrap_or(0.0),
             doubts: log.doubts,
+            t: log.t,
         })
+    }
+
+    /// Lets one clock run through all logs, as [`common_clock`](super::common_clock) does.
+    pub fn common_clock<'o>(logs: impl Iterator<Item = &'o mut ServoLog>) {
+        let logs: Vec<&mut ServoLog> = logs.collect();
+        let clocks = clocks(logs.iter().map(|log| log.t.as_slice()));
+        logs.into_iter().zip(clocks).for_each(|(log, clock)| log.clock = clock);
     }
 }
 

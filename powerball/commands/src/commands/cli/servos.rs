@@ -85,7 +85,8 @@ impl ServoLogs {
             };
             sources.iter().filter_map(one).collect()
         };
-        let (fit, validate) = (read(fit), read(validate));
+        let (mut fit, mut validate) = (read(fit), read(validate));
+        ServoLog::common_clock(fit.iter_mut().chain(&mut validate));
         match errors.is_empty() {
             true => Ok(ServoLogs { fit, validate, warnings }),
             false => Err(Failure::Unusable(errors.join("\n"))),
