@@ -92,8 +92,8 @@ const GRID: f64 = 0.5;
 const SHORT: usize = 16;
 /// Ends of longer windows are looked for this many grid steps apart first.
 const COARSE: usize = 4;
-/// Longer windows keep away from their log's ends by a share of 1 / `CLEAR` of it: what is there until the
-/// end is a payload.
+/// Longer windows keep away from their log's ends by a share of 1 / `CLEAR` of it where the arm feels a
+/// weight: what is there until the end is then a payload.
 const CLEAR: usize = 10;
 /// Share of a window's gain that one half of its time must explain to be a push by itself: a force that is constant
 /// explains half of it in half of its time.
@@ -199,7 +199,8 @@ impl Effect for ContactWrench {
 
 /// A constant force in the window that explains most, and pushes about its middle. Short windows are all
 /// tried, longer ones on a coarse grid, whose ends are then moved. No window begins where the arm starts from
-/// rest: an error there comes from the start itself. A push that lasts longer is found from then on.
+/// rest, where an error comes from the start itself: a push that lasts longer is found from then on. A whole
+/// log is tried where the arm feels no weight.
 fn search(context: &Context<'_>) -> Option<Vec<Candidate>> {
     let (data, fit) = (context.data, context.fit);
     let columns = data.force_columns();
@@ -209,11 +210,13 @@ fn search(context: &Context<'_>) -> Option<Vec<Candidate>> {
     let solver = fit.solver();
     let steps = data.blocks_of(GRID);
     let rests = rests(context, &steps, GRID);
+    let heavy = feels_weight(context);
     let sets_off: Vec<bool> = (steps.iter())
         .map(|step| {
             step_start(context, step).is_none_or(|start| sets_off(&rests, &data.logs[step.log], start))
         })
         .collect();
+    let logs = by_log(&steps);
     let mut before = vec![Sums::zero(&solver, 3)];
     for step in &steps {
         let mut sum = before[before.len() - 1].clone();
@@ -223,7 +226,7 @@ fn search(context: &Context<'_>) -> Option<Vec<Candidate>> {
     let mut searched = 0.0;
     let mut best: Option<(f64, Range<usize>)> = None;
     let mut consider = |window: Range<usize>, best: &mut Option<(f64, Range<usize>)>| {
-        if sets_off[window.start] {
+        if sets_off[window.start] && (heavy || !logs.contains(&window)) {
             return;
         }
         let mut sums = before[window.end].clone();
@@ -234,14 +237,16 @@ fn search(context: &Context<'_>) -> Option<Vec<Candidate>> {
             *best = Some((gain, window));
         }
     };
-    let logs = by_log(&steps);
     for log in &logs {
         for first in log.clone() {
             for end in first + 1..=(first + SHORT).min(log.end) {
                 consider(first..end, &mut best);
             }
         }
-        let inner = inner(log);
+        if !heavy {
+            consider(log.clone(), &mut best);
+        }
+        let inner = inner(log, heavy);
         for first in inner.clone().step_by(COARSE) {
             for end in (first + SHORT + 1..=inner.end).step_by(COARSE) {
                 consider(first..end, &mut best);
@@ -251,7 +256,7 @@ fn search(context: &Context<'_>) -> Option<Vec<Candidate>> {
     let (_, coarse) = best.clone()?;
     let log = logs.iter().find(|log| log.contains(&coarse.start))?;
     if coarse.len() > SHORT {
-        let inner = inner(log);
+        let inner = inner(log, heavy);
         let near =
             |at: usize| at.saturating_sub(COARSE - 1).max(inner.start)..(at + COARSE).min(inner.end + 1);
         for first in near(coarse.start) {
@@ -358,8 +363,24 @@ fn mean(candidate: &Candidate, c: &[f64]) -> Vec<f64> {
     (0..3).map(|axis| (0..knots).map(|k| share(k) * c[3 * k + axis]).sum()).collect()
 }
 
+/// Whether the arm feels a weight at its tool.
+fn feels_weight(context: &Context<'_>) -> bool {
+    let (columns, gravity) = (context.data.force_columns(), context.data.body.gravity());
+    let largest = |column: &Column| {
+        let values = column.parts.iter().flat_map(|(_, values)| values.iter());
+        values.fold(0.0, |largest: f64, v| largest.max(v.abs()))
+    };
+    let all: Vec<f64> = columns.iter().map(largest).collect();
+    let most = all.iter().copied().fold(0.0, f64::max);
+    // What is less is rounding.
+    all.iter().zip(gravity).any(|(own, g)| g != 0.0 && *own > 1e-9 * most)
+}
+
 /// The range of a log's longer windows.
-fn inner(log: &Range<usize>) -> Range<usize> {
+fn inner(log: &Range<usize>, heavy: bool) -> Range<usize> {
+    if !heavy {
+        return log.clone();
+    }
     let clear = log.len().div_ceil(CLEAR);
     log.start + clear..log.end.saturating_sub(clear).max(log.start + clear)
 }

@@ -181,6 +181,18 @@ pub trait Effect: Sync {
 
     // The report on an accepted effect.
 
+    /// The gradient of the size whose standard error is given, by coefficient; the size is linear along the
+    /// coefficients themselves. `None` where it is the factor of the whole torque.
+    fn size(&self, _candidate: &Candidate, _coefficients: &[f64]) -> Option<Vec<f64>> {
+        None
+    }
+
+    /// The same effect without an assumption that its law makes; `None` where it makes none. By the difference
+    /// of the two sizes the standard error is larger.
+    fn otherwise(&self, _candidate: &Candidate) -> Option<Candidate> {
+        None
+    }
+
     /// The windows of the effect in the context's logs, and those in which it continues in logs that were not
     /// fitted.
     fn windows(&self, _context: &Context<'_>, candidate: &Candidate) -> Vec<Window> {

@@ -29,6 +29,17 @@ pub struct Settings {
     /// The link that carries it; `None` for the last one's hand. Of another link `com` is the direction of the first
     /// moment.
     pub link: Option<usize>,
+    /// What is taken of its inertia.
+    pub inertia: Inertia,
+}
+
+/// What is taken of the inertia of a body in the hand; on another link it is what the logs show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Inertia {
+    /// That of a point at the centre of mass.
+    OfPoint,
+    /// More than that, about all axes alike, as the logs show.
+    Free,
 }
 
 /// Figures of this effect in a result.
@@ -62,12 +73,17 @@ pub struct Figures {
 impl Figures {
     /// The figures in words.
     #[must_use]
-    pub(super) fn in_words(&self, _: &Words<'_>) -> String {
+    pub(super) fn in_words(&self, words: &Words<'_>) -> String {
         let vector = |x: &[f64; 3]| format!("({})", x.map(number).join(", "));
+        // On another link the standard error is that of the first moment.
+        let mass = |mass: f64| if self.link.is_some() { number(mass) } else { words.size(0, mass) };
         let what = match (self.mass, &self.com, &self.first_moment) {
-            (Some(mass), Some(com), _) => format!("{} kg at {} m", number(mass), vector(com)),
-            (Some(mass), None, _) => format!("{} kg", number(mass)),
-            (None, _, Some(moment)) => format!("first moment {} kg·m", vector(moment)),
+            (Some(own), Some(com), _) => format!("{} kg at {} m", mass(own), vector(com)),
+            (Some(own), None, _) => format!("{} kg", mass(own)),
+            (None, _, Some(moment)) => {
+                let length = moment.iter().map(|x| x * x).sum::<f64>().sqrt();
+                format!("first moment {} kg·m, {}", words.size(0, length), vector(moment))
+            }
             (None, ..) => "a body".to_string(),
         };
         let link = self.link.map_or_else(|| "the last link".to_string(), |link| format!("link {link}"));
@@ -185,6 +201,21 @@ impl Effect for Payload {
         (c[0] > 0.0).then(|| candidate.with(Settings { com: Some(com()), ..*settings }))
     }
 
+    /// Its mass in the hand, the length of its first moment on another link.
+    fn size(&self, candidate: &Candidate, c: &[f64]) -> Option<Vec<f64>> {
+        let mut gradient = vec![0.0; c.len()];
+        match Settings::of(candidate)?.link {
+            None => gradient[0] = 1.0,
+            Some(_) => gradient[..3].copy_from_slice(&link_body::direction(c)?),
+        }
+        Some(gradient)
+    }
+
+    fn otherwise(&self, candidate: &Candidate) -> Option<Candidate> {
+        let settings = *Settings::of(candidate)?;
+        settings.link.is_none().then(|| candidate.with(Settings { inertia: Inertia::Free, ..settings }))
+    }
+
     /// A payload may have been taken off before another log, or taken up and put down in it. Each log is
     /// tested by itself; the clocks are overruled if the log clearly contradicts them, as for the fitted
     /// logs.
@@ -245,10 +276,14 @@ fn centre(c: &[f64]) -> [f64; 3] {
 
 /// The columns of a body where its settings say that it is.
 fn columns_of(context: &Context<'_>, settings: &Settings) -> Vec<Column> {
-    match settings.link {
-        None => payload_columns(context, settings.com),
-        Some(link) => link_body::columns(context, link, settings.com),
-    }
+    let Some(link) = settings.link else {
+        let mut columns = payload_columns(context, settings.com);
+        if settings.inertia == Inertia::Free {
+            columns.extend(own_inertia(context));
+        }
+        return columns;
+    };
+    link_body::columns(context, link, settings.com)
 }
 
 /// Columns for mass and first moments with the inertia of a point mass at `com`.
@@ -280,10 +315,23 @@ fn payload_columns(context: &Context<'_>, com: Option<[f64; 3]>) -> Vec<Column> 
         .collect()
 }
 
+/// The column of an inertia about the centre of mass of a body in the hand, the same about all axes.
+fn own_inertia(context: &Context<'_>) -> Option<Column> {
+    let links = context.data.link_columns(context.data.dof() - 1);
+    let of = |kind: ParameterKind| links.get(kind as usize);
+    let mut column = of(ParameterKind::Ixx)?.clone();
+    for other in [of(ParameterKind::Iyy)?, of(ParameterKind::Izz)?] {
+        for ((_, values), (_, more)) in column.parts.iter_mut().zip(&other.parts) {
+            Arc::make_mut(values).iter_mut().zip(more.iter()).for_each(|(v, m)| *v += m);
+        }
+    }
+    Some(column)
+}
+
 /// When each log has it, as explains most, and which logs share it.
 fn search(context: &Context<'_>, link: Option<usize>) -> Option<Candidate> {
     let (data, fit) = (context.data, context.fit);
-    let settings = Settings { com: None, stays: false, link };
+    let settings = Settings { com: None, stays: false, link, inertia: Inertia::OfPoint };
     let columns = columns_of(context, &settings);
     if columns.is_empty() {
         return None;

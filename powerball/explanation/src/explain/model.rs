@@ -5,6 +5,7 @@ use crate::effects::{self, Candidate, Context, Effect, Made};
 use crate::rule::Rule;
 use powerball_identification::estimate::{Fit, Folds, NormalEquations, Solver, Term, fit};
 use powerball_logs::regression::{Column, Data, Signals};
+use powerball_logs::vector::dot;
 use std::ops::Range;
 use std::sync::OnceLock;
 
@@ -190,6 +191,36 @@ impl Model {
     pub(super) fn errors(&self) -> impl Fn(usize) -> Option<f64> {
         let variances = self.fit.solver().inverse_diagonal();
         move |column| variances.get(column).filter(|v| v.is_finite()).map(|v| v.max(0.0).sqrt())
+    }
+
+    /// The model with another candidate in the place of an accepted one, fitted.
+    fn with(&self, study: &Study<'_>, k: usize, candidate: Candidate) -> Model {
+        let mut accepted = self.accepted.clone();
+        let columns = self.context(study).columns(&candidate).len();
+        accepted[k].replace(candidate, columns);
+        let fit = fitted_again(study, &mut accepted, &self.fit);
+        Model { accepted, ..Model::new(fit) }
+    }
+
+    /// The size of an accepted effect that has one of its own, and the standard error that noise gives it.
+    fn size(&self, k: usize) -> Option<(f64, f64)> {
+        let (a, c) = (&self.accepted[k], &self.coefficients()[k]);
+        let gradient = a.effect().size(&a.candidate, c)?;
+        let mut along = vec![0.0; self.fit.design.size];
+        along[self.places()[k].clone()].copy_from_slice(&gradient);
+        let variance = dot(&along, &self.fit.solver().solve(&along));
+        Some((dot(&gradient, c), variance.max(0.0).sqrt()))
+    }
+
+    /// The standard error of an accepted effect's size, a share of it; `of_factor` is that of the factor of its
+    /// torque. Where its law assumes something, the truth is anywhere between this and what logs say without
+    /// the assumption: with equal chances the mean square of its distance is a third of the square of theirs.
+    pub(super) fn size_error(&self, study: &Study<'_>, k: usize, of_factor: Option<f64>) -> Option<f64> {
+        let Some((size, std)) = self.size(k) else { return of_factor };
+        let a = &self.accepted[k];
+        let other = a.effect().otherwise(&a.candidate).and_then(|other| self.with(study, k, other).size(k));
+        let apart = other.map_or(0.0, |(other, _)| other - size);
+        Some((std.powi(2) + apart.powi(2) / 3.0).sqrt() / size.abs())
     }
 
     /// How much of each accepted effect is its own.

@@ -25,8 +25,6 @@ const SHORTEST: f64 = 0.3;
 const AROUND: f64 = 0.6;
 /// Number of times that an inertia or a secant is computed again from the last estimate.
 const ROUNDS: usize = 4;
-/// Further joints whose friction has changed as well explain at least this much of χ² each.
-const FURTHER: f64 = 30.0;
 /// The start of a change is known only roughly: rows within this time before and after it are not used for
 /// its size, s.
 const BLURRED: [f64; 2] = [0.15, 0.3];
@@ -41,7 +39,7 @@ const ELSEWHERE: f64 = 20.0;
 const BLOCK: usize = 12;
 /// A heavier body pulls more than any push that could be mistaken for one, kg.
 const HEAVIEST: f64 = 200.0;
-/// A joint shows a change where that explains this much of its χ².
+/// A joint shows a change, or has changed friction as well, where that explains this much of its χ².
 const SHOWS: f64 = 15.0;
 
 /// The rows of a stretch of a log, and their residual.
@@ -373,7 +371,8 @@ impl<'a> Stretch<'a> {
     /// A body that the last link holds.
     fn payload(&self, context: &Context<'_>, guess: Guess, held: f64) -> Option<Named> {
         let joints = (0..self.data.dof()).map(JointNumber::from_index).collect();
-        let settings = payload::Settings { com: None, stays: false, link: None };
+        let settings =
+            payload::Settings { com: None, stays: false, link: None, inertia: payload::Inertia::OfPoint };
         let mut candidate =
             Candidate { windows: vec![self.everywhere()], ..Candidate::on_all(joints, settings, 1) };
         let since = self.beginning(&context.columns(&candidate), guess);
@@ -418,7 +417,7 @@ impl<'a> Stretch<'a> {
         for joint in context.moving_joints() {
             let own = |change: &Change| matches!(change, Change::Friction { joint: j, .. } if *j == joint);
             let Some(more) = best_of(&asked, &|c| c.joints[0] == joint) else { continue };
-            if !all.changes.iter().any(own) && more.explains > FURTHER {
+            if !all.changes.iter().any(own) && more.explains > SHOWS {
                 all.changes.extend(more.changes);
                 all.columns.extend(more.columns);
                 all.coefficients.extend(more.coefficients);

@@ -117,14 +117,13 @@ fn named_effect(
 ) -> Option<NamedEffect> {
     let coefficients = model.coefficients();
     let shares = model.own();
-    let mut own: Vec<(&Accepted, &Vec<f64>, &Own)> = (model.accepted.iter().zip(&coefficients).zip(&shares))
-        .map(|((a, coefficients), share)| (a, coefficients, share))
-        .filter(|(a, ..)| a.effect() == effect)
-        .collect();
+    let which = (0..model.accepted.len()).filter(|k| model.accepted[*k].effect() == effect);
+    let mut own: Vec<(&Accepted, &Vec<f64>, &Own, usize)> =
+        which.map(|k| (&model.accepted[k], &coefficients[k], &shares[k], k)).collect();
     own.sort_by_key(|(a, ..)| a.candidate.joints.clone());
     let own = || own.iter().copied();
     let found: Vec<Found<'_>> =
-        own().map(|(a, c, _)| Found { candidate: &a.candidate, coefficients: c }).collect();
+        own().map(|(a, c, ..)| Found { candidate: &a.candidate, coefficients: c }).collect();
     let mut joints: Vec<JointNumber> = found.iter().flat_map(|f| f.candidate.joints.clone()).collect();
     joints.sort_unstable();
     joints.dedup();
@@ -140,7 +139,7 @@ fn named_effect(
     Some(NamedEffect {
         effect: effect.name().to_string(),
         figures: effect.figures(&model.context(study), &found),
-        relative_std: own().map(|(_, _, own)| own.relative_std).collect(),
+        relative_std: own().map(|(_, _, own, k)| model.size_error(study, k, own.relative_std)).collect(),
         rms_before: joints.iter().map(|j| first.before[j.index()]).collect(),
         rms_after: joints.iter().map(|j| last.after[j.index()]).collect(),
         p_value: own().map(|(a, ..)| a.p_value).fold(0.0, f64::max),
@@ -150,7 +149,7 @@ fn named_effect(
         probability: f64::NAN,
         margin: first.comparison.margin,
         leftover: left(&joints),
-        own_share: own().map(|(_, _, own)| own.share).fold(1.0, f64::min),
+        own_share: own().map(|(_, _, own, _)| own.share).fold(1.0, f64::min),
         class: effect.class().name().to_string(),
         rivals: rivals(&study.options.ruled_out, &first.comparison, effect.name()),
         joints,

@@ -307,8 +307,60 @@ fn a_body_on_another_link_is_found_there() {
         }
         let logs: Vec<String> = listed.iter().map(|k| format!("log{k}")).collect();
         assert_eq!(explained.effects[0].logs, logs);
+        // Learnt on validation logs it has no standard error.
+        let std = explained.effects[0].relative_std.first().copied().flatten();
+        assert_eq!(std.is_some(), listed != &[5]);
+        let length = (0..3).map(|k| found["first_moment"][k].as_f64().unwrap().powi(2)).sum::<f64>().sqrt();
+        assert!(std.is_none_or(|std| (length - truth.norm()).abs() < 1.96 * std * length), "{found} {std:?}");
         at_the_floor(&explained);
     }
+}
+
+/// The model takes what is held for a point. A bar of the same mass turns less easily: its mass is within the
+/// interval, since the standard error contains what is taken of the inertia.
+#[test]
+fn the_error_of_a_mass_contains_what_is_taken_of_its_inertia() {
+    let (arm, usual) = planar();
+    let (mass, bar) = (0.3, Vector3::new(0.0, 0.0, 0.009));
+    let held = Body::about_centre(mass, Vector3::new(0.05, 0.02, 0.0), Matrix3::from_diagonal(&bar), 0.0);
+    let mut bodies = usual.dynamics().bodies().to_vec();
+    bodies[1].mass += held.mass;
+    bodies[1].moment += held.moment;
+    bodies[1].inertia += held.inertia;
+    let with = recorded(&arm, &plant(&arm, bodies, &[4.0, 2.0], &[0.2, 0.06]), &[]);
+    let mut logs = recorded(&arm, &usual, &[]);
+    [1, 4].iter().for_each(|k| logs[*k] = with[*k].clone());
+    let explained = explained_logs(&arm, logs);
+    assert_eq!(names(&explained), ["payload"]);
+    let found = figures(&explained.effects[0])["mass"].as_f64().unwrap();
+    let std = found * explained.effects[0].relative_std[0].unwrap();
+    assert!((found - mass).abs() < 1.96 * std && std < 0.1 * mass, "{found} ± {std}");
+}
+
+/// On an axis that feels no weight a load that pulls during a whole log is one force from its beginning to its
+/// end: no body held to the end could be meant.
+#[test]
+fn a_load_along_a_level_axis_lasts_for_its_whole_log() {
+    const LOAD: f64 = 196.0;
+    let text = "name = \"axis\"\nconvention = \"modified\"\ngravity = [0, 0, -9.81]\n[[joint]]\n\
+                kind = \"prismatic\"\na = 0\nalpha = \"pi/2\"\nd = 0\ntheta = \"0\"\n";
+    let arm = Arm::parse(text, "axis.toml").unwrap();
+    let slide = plant(&arm, vec![Body::even_box(95.0, [0.0; 3], [0.3; 3], 0.0)], &[25.0], &[2.0]);
+    let mut logs = recorded(&arm, &slide, &[]);
+    logs[1].torque[0].iter_mut().for_each(|torque| *torque += LOAD);
+    let explained = explained_logs(&arm, logs.clone());
+    assert_eq!(names(&explained), ["contact_wrench"]);
+    let [(from, to)] = spans(&explained)[..] else { panic!("{:?}", spans(&explained)) };
+    let [first, last] = [logs[1].t[0], logs[1].t[logs[1].t.len() - 1]];
+    assert!(from < first + 2.0 && to > last - 2.0, "{from} {to} of {first} {last}");
+    let force: f64 = figures(&explained.effects[0])["force"][0]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|f| f.as_f64().unwrap().powi(2))
+        .sum::<f64>()
+        .sqrt();
+    approx::assert_relative_eq!(force, LOAD, max_relative = 0.01);
 }
 
 #[test]
