@@ -411,3 +411,86 @@ fn stand(map: &mut FxHashMap<u64, Stand>, value: Fp, role: Option<Role>, side: O
         map.entry(value.residue()).or_insert(Stand { role, side, number });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix3, Vector3};
+    use rand::{RngExt, SeedableRng};
+
+    /// B = LᵀDL, from the last row on.
+    fn factors(b: &Matrix3<f64>) -> (Matrix3<f64>, Vector3<f64>) {
+        let (mut lower, mut pivots, mut rest) = (Matrix3::identity(), Vector3::zeros(), *b);
+        for i in (0..3).rev() {
+            pivots[i] = rest[(i, i)];
+            let row = rest.row(i) / pivots[i];
+            (0..i).for_each(|j| lower[(i, j)] = row[j]);
+            rest -= row.transpose() * row * pivots[i];
+        }
+        (lower, pivots)
+    }
+
+    /// Factors and solutions of perturbed matrices are within the bounds, and come near them.
+    #[test]
+    fn perturbed_solves_are_within_their_bounds() {
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(5);
+        let mut nearest = [0.0f64; 6];
+        for _ in 0..20_000 {
+            let mut uniform = || rng.random_range(-1.0..1.0f64);
+            let root = Matrix3::from_fn(|i, j| if i == j { 1.5 + uniform() } else { uniform() });
+            // As of an arm: later joints carry less.
+            let scale = Matrix3::from_diagonal(&Vector3::new(1.0, 0.2, 0.02));
+            let b = scale * root * root.transpose() * scale;
+            let inverse = b.try_inverse().unwrap();
+            let mobility: Vec<f64> = (0..3).map(|i| inverse[(i, i)].sqrt()).collect();
+            let (lower, pivots) = factors(&b);
+            let mut eta = 0.0;
+            let mut moved = b;
+            for i in 0..3 {
+                for j in 0..=i {
+                    let delta = 1e-3 * uniform() / (mobility[i] * mobility[j]);
+                    moved[(i, j)] += delta;
+                    moved[(j, i)] = moved[(i, j)];
+                    eta += if i == j { 1.0 } else { 2.0 } * mobility[i] * mobility[j] * delta.abs();
+                }
+            }
+            let right = Vector3::from_fn(|i, _| uniform() / mobility[i]);
+            let (before, after) = [1e-3 * uniform(), 1e-3 * uniform()].into();
+            let residual = Vector3::new(0.0, before / mobility[1], 0.0);
+            let (lower_moved, pivots_moved) = factors(&moved);
+            let late = Vector3::new(0.0, 0.0, after / pivots_moved[2].sqrt());
+            let energy: f64 = (0..3).map(|i| mobility[i] * right[i].abs()).sum();
+            let rho = mobility[1] * residual[1].abs() + pivots_moved[2].sqrt() * late[2].abs();
+            let solves = Solves {
+                roles: Vec::new(),
+                rights: vec![Vec::new()],
+                is_right: Vec::new(),
+                pivots: pivots.iter().map(|d| Interval::point(*d)).collect(),
+                diagonal: (0..3).map(|i| b[(i, i)]).collect(),
+                mobility,
+            };
+            let running = Running { eta: [eta; 2], rho: vec![[rho; 2]], local: Vec::new() };
+            let y = |lower: &Matrix3<f64>, r: Vector3<f64>| lower.transpose().try_inverse().unwrap() * r;
+            let (y_0, y_1) = (y(&lower, right), y(&lower_moved, right + residual));
+            let (z_0, z_1) = (y_0.component_div(&pivots), y_1.component_div(&pivots_moved));
+            let x_1 = lower_moved.try_inverse().unwrap() * (z_1 + late);
+            let x_0 = inverse * right;
+            let mut check = |which: usize, role: Role, error: f64| {
+                let bound = solves.bound(&running, role, energy, 1);
+                assert!(error.abs() <= bound, "{role:?}: {error:e} of {bound:e}");
+                nearest[which] = nearest[which].max(error.abs() / bound);
+            };
+            for i in 0..3 {
+                check(0, Role::Pivot(i), pivots_moved[i] - pivots[i]);
+                check(1, Role::OfPivot(i), 1.0 / pivots_moved[i] - 1.0 / pivots[i]);
+                for j in 0..i {
+                    check(2, Role::Lower(i, j), lower_moved[(i, j)] - lower[(i, j)]);
+                }
+                check(3, Role::Right(0, i), y_1[i] - y_0[i]);
+                check(4, Role::Half(0, i), z_1[i] - z_0[i]);
+                check(5, Role::Solution(0, i), x_1[i] - x_0[i]);
+            }
+        }
+        assert!(nearest.iter().all(|x| *x > 0.1), "{nearest:?}");
+    }
+}
