@@ -33,6 +33,18 @@ impl Arm {
         self.bars.get(body.checked_sub(self.links())?)
     }
 
+    /// The parameters of a body that are declared zero.
+    ///
+    /// # Panics
+    /// If the arm has no such body.
+    pub fn declared_zero_mut(&mut self, body: usize) -> &mut Vec<ParameterKind> {
+        let links = self.links();
+        match body.checked_sub(links) {
+            None => &mut self.joints[body].zero,
+            Some(bar) => &mut self.bars[bar].zero,
+        }
+    }
+
     /// For whoever takes an arm to be a chain alone.
     ///
     /// # Errors

@@ -217,11 +217,9 @@ fn tie(joints: &mut [Joint], convention: Convention, found: &Loop) -> Result<(),
 
 /// An angle between −pi and pi as a number of radians; zero where it is a whole number of turns.
 fn wrapped(angle: &Angle) -> Rational {
-    if angle.quarter_turns() == Some(0) {
-        return Rational::zero();
-    }
     let radians = angle.radians();
-    decimal(radians - TAU * (radians / TAU).round())
+    let rest = radians - TAU * (radians / TAU).round();
+    if rest.abs() < SAME { Rational::zero() } else { decimal(rest) }
 }
 
 /// A number to 15 decimals.

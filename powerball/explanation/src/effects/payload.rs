@@ -1,4 +1,4 @@
-//! A body held by the last link or carried by another one, from the start of a log or from some time on, to its
+//! A body held by the last link or carried by another one, or by a bar of a closed loop, from the start of a log or from some time on, to its
 //! end or to some time.
 
 use super::link_body::{self, Body};
@@ -49,7 +49,10 @@ pub struct Figures {
     /// link.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_moment: Option<[f64; 3]>,
-    /// The link that carries the body, if it is not the last one.
+    /// The name of the bar that carries the body, where that is no link of the chain.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bar: Option<String>,
+    /// The link, or the bar by its number after them, that carries the body, if it is not the last one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<JointNumber>,
     /// Mass of the body, kg; nothing where only its first moment shows.
@@ -70,7 +73,11 @@ impl Figures {
             (None, _, Some(moment)) => format!("first moment {} kg·m", vector(moment)),
             (None, ..) => "a body".to_string(),
         };
-        let link = self.link.map_or_else(|| "the last link".to_string(), |link| format!("link {link}"));
+        let link = match (&self.bar, self.link) {
+            (Some(bar), _) => format!("bar {bar}"),
+            (None, Some(link)) => format!("link {link}"),
+            (None, None) => "the last link".to_string(),
+        };
         let times = self.start_time.iter().enumerate().map(|(k, from)| {
             match self.end_time.get(k).copied().flatten() {
                 Some(to) => format!("{} to {} s", number(*from), number(to)),
@@ -125,7 +132,9 @@ impl Effect for Payload {
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        let others = (0..context.data.dof().saturating_sub(1)).map(Some);
+        let (dof, bodies) = (context.data.dof(), context.data.body.arm().bodies());
+        // On other links, and on the bars of loops.
+        let others = (0..dof.saturating_sub(1)).chain(dof..bodies).map(Some);
         std::iter::once(None).chain(others).filter_map(|link| search(context, link)).collect()
     }
 
@@ -229,6 +238,7 @@ impl Effect for Payload {
             com: point.map(|(_, com)| com),
             com_in_link: point.map(|(_, com)| arm.in_link_frame(on, com)),
             first_moment: body.map(|body| body.moment.into()),
+            bar: link.and_then(|link| arm.arm().bar(link)).map(|bar| bar.name.clone()),
             link: link.map(JointNumber::from_index),
             end_time: Window::ends(windows),
             mass: point.map(|(mass, _)| mass),

@@ -45,9 +45,7 @@ impl Wide {
     fn new(arm: &Arm, gravity: Option<[i64; 3]>) -> Result<Wide, Error> {
         let mut arm = arm.clone();
         arm.groupings.clear();
-        for joint in &mut arm.joints {
-            joint.zero.clear();
-        }
+        (0..arm.bodies()).for_each(|body| arm.declared_zero_mut(body).clear());
         if let Some(g) = gravity {
             arm.gravity = g.map(rational::integer);
         }
@@ -203,7 +201,7 @@ impl RigidArm {
     /// Values of all eleven parameters a link that move like the minimal set's `values`.
     #[must_use]
     pub fn carried(&self, values: &[f64]) -> Vec<f64> {
-        let mut all = vec![0.0; 11 * self.dof()];
+        let mut all = vec![0.0; self.arm().all_parameters().len()];
         if let Ok(set) = self.model.set(SetKind::Minimal) {
             for (parameter, value) in set.parameters.iter().zip(values) {
                 for (carrier, coefficient) in &parameter.carriers {
@@ -335,7 +333,7 @@ pub(super) fn gravity_unobservable(body: &RigidArm) -> Option<Vec<Vec<f64>>> {
     let (felt, _) = split(&(&pulled * &unseen), pulled.norm_l2())?;
     let directions = unseen * felt;
     let whole = |d: usize| {
-        let mut all = vec![0.0; 11 * body.dof()];
+        let mut all = vec![0.0; arm.all_parameters().len()];
         kept.iter().enumerate().for_each(|(row, k)| all[*k] = directions[(row, d)]);
         all
     };
