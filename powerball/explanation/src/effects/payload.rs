@@ -133,9 +133,13 @@ impl Effect for Payload {
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
         let (dof, bodies) = (context.data.dof(), context.data.body.arm().bodies());
-        // On other links, and on the bars of loops.
-        let others = (0..dof.saturating_sub(1)).chain(dof..bodies).map(Some);
-        std::iter::once(None).chain(others).filter_map(|link| search(context, link)).collect()
+        let links = std::iter::once(None).chain((0..dof.saturating_sub(1)).map(Some));
+        let mut found: Vec<(Candidate, f64)> = links.filter_map(|link| search(context, link)).collect();
+        // A bar of a loop moves much like the link that it turns with: only what no link explains is on it.
+        let most = found.iter().map(|(_, explained)| *explained).fold(0.0, f64::max);
+        let bars = (dof..bodies).filter_map(|bar| search(context, Some(bar)));
+        found.extend(bars.filter(|(_, explained)| *explained > most + context.rule.another_log));
+        found.into_iter().map(|(candidate, _)| candidate).collect()
     }
 
     /// One body at a time.
@@ -290,8 +294,8 @@ fn payload_columns(context: &Context<'_>, com: Option<[f64; 3]>) -> Vec<Column> 
         .collect()
 }
 
-/// When each log has it, as explains most, and which logs share it.
-fn search(context: &Context<'_>, link: Option<usize>) -> Option<Candidate> {
+/// When each log has it, as explains most, and which logs share it; and how much it explains.
+fn search(context: &Context<'_>, link: Option<usize>) -> Option<(Candidate, f64)> {
     let (data, fit) = (context.data, context.fit);
     let settings = Settings { com: None, stays: false, link };
     let columns = columns_of(context, &settings);
@@ -325,7 +329,7 @@ fn search(context: &Context<'_>, link: Option<usize>) -> Option<Candidate> {
     let settings = Settings { stays, ..settings }.into();
     let mut joints = all_joints(data);
     joints.truncate(link.map_or(joints.len(), |link| link + 1));
-    Some(Candidate { joints, settings, windows, searched: held.searched })
+    Some((Candidate { joints, settings, windows, searched: held.searched }, held.explained))
 }
 
 /// Whether a run of steps of `step` seconds can be a body that is held.
