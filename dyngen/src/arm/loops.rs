@@ -1,5 +1,5 @@
-//! `[[loop]]`: planar loops of four bars, which close on the chain. Those that are parallelograms are known: the
-//! joints of the chain in it are affine functions of each other, and its other bars are [`Bar`]s.
+//! `[[loop]]`: planar loops of four bars, which close on the chain. Those that are parallelograms are known:
+//! their joints of the chain are affine functions of each other, and their other bars are [`Bar`]s.
 
 use super::table::{Reader, Table, Value, describe};
 use super::{Angle, Bar, Convention, Joint, JointKind, Mimic, ParameterKind};
@@ -99,8 +99,8 @@ fn names(
         None
     };
     if items.len() != BARS {
-        let message = "must be the four joints around the loop: first one or two of the chain, by name or number, then \
-                       names for its other pins";
+        let message = "must be the four joints around the loop: first one or two of the chain, by name or \
+                       number, then names for its other pins";
         return fail(v.span(), format!("{message}, found {}", describe(v)));
     }
     let (mut of_chain, mut pins): (Vec<usize>, Vec<String>) = (Vec::new(), Vec::new());
@@ -176,7 +176,10 @@ fn planar(joints: &[Joint], convention: Convention, found: &Loop) -> Option<Stri
     }
     (found.first != found.last && found.sign(convention, joints).is_none()).then(|| {
         let (first, last) = (found.first + 1, found.last + 1);
-        format!("is not planar: the axes of joints {first} and {last} are not parallel (alpha between them is not 0 or pi)")
+        format!(
+            "is not planar: the axes of joints {first} and {last} are not parallel (alpha between them is not 0 \
+             or pi)"
+        )
     })
 }
 

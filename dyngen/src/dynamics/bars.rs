@@ -1,8 +1,9 @@
 //! Bars of closed loops on the chain.
 //!
-//! A bar's origin is a point of one link, and it turns with another. So its force acts on the one link at the pin, and its
-//! moment on the other: v·f + ω·n is its power, whatever moves. The forces in its pins never appear. With these two
-//! wrenches the recursion gives the torques of bars; the matrices follow from it column by column.
+//! A bar's origin is a point of one link, and it turns with another. So its force acts on the one link at the
+//! pin, and its moment on the other: v·f + ω·n is its power, whatever moves. The forces in its pins never
+//! appear. With these two wrenches the recursion gives the torques of bars; the matrices follow from it column
+//! by column.
 
 use super::body::{Vector, ZERO};
 use super::chain::LinkGeometry;
@@ -29,7 +30,8 @@ pub struct BarBody {
     pin: Vector,
     /// The link that it turns with; `None` is the base.
     parallel: Option<usize>,
-    /// From the chain's axes of that link to the file's: about x, and about z where the chain turns the last link back.
+    /// From the chain's axes of that link to the file's: about x, and about z where the chain turns the last
+    /// link back.
     file_turn: SinCos,
     last_turn: SinCos,
     /// Its body about the pin, in the chain's axes of the link that it turns with.
