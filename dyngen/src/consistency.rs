@@ -183,7 +183,7 @@ fn impossible_links(arm: &Arm, set: &ParameterSet, values: &[f64]) -> Vec<String
         set.parameters.iter().position(single).map(|i| values[i])
     };
     let mut reasons = Vec::new();
-    for link in 0..arm.links() {
+    for link in 0..arm.bodies() {
         let of = |kind| {
             let p = Parameter { link, kind };
             if arm.keeps(p) { given(p) } else { Some(0.0) }

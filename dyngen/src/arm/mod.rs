@@ -1,5 +1,7 @@
 //! The arm as its file describes it: kinematics, declared symmetries, rotors, limits.
 
+mod bar;
+mod loops;
 mod mimic;
 pub mod parameter;
 mod read;
@@ -11,6 +13,7 @@ pub mod transmission;
 use crate::diagnostic::Diagnostics;
 pub use crate::exact::angle::Angle;
 use crate::exact::rational::{self, Rational};
+pub use bar::Bar;
 pub use mimic::{Drive, Mimic};
 use nalgebra::{Rotation3, Vector3};
 use num_traits::{One, Zero};
@@ -183,6 +186,8 @@ pub struct Arm {
     pub groupings: Vec<Grouping>,
     /// Motors that turn with several joints, empty where each turns with its own.
     pub transmissions: Vec<Transmission>,
+    /// Bars of closed loops, whose bodies come after the links of the chain.
+    pub bars: Vec<Bar>,
 }
 
 /// What the file does not say is left out: generated files state a hash of this text, which does not change
@@ -201,6 +206,9 @@ impl fmt::Debug for Arm {
         }
         if !self.transmissions.is_empty() {
             text.field("transmissions", &self.transmissions);
+        }
+        if !self.bars.is_empty() {
+            text.field("bars", &self.bars);
         }
         if let Some(link) = self.tool_link {
             text.field("tool_link", &link);
@@ -275,13 +283,16 @@ impl Arm {
         self.all_parameters().into_iter().filter(|p| self.keeps(*p)).collect()
     }
 
-    /// All eleven parameters of every link, in order.
+    /// All eleven parameters of every link of the chain, then of every bar, in order.
     pub fn all_parameters(&self) -> Vec<Parameter> {
-        (0..self.links()).flat_map(|link| ParameterKind::ALL.map(|kind| Parameter { link, kind })).collect()
+        (0..self.bodies()).flat_map(|link| ParameterKind::ALL.map(|kind| Parameter { link, kind })).collect()
     }
 
     /// Whether a parameter is neither declared zero nor a rotor inertia of a joint without rotor.
     pub fn keeps(&self, parameter: Parameter) -> bool {
+        if let Some(bar) = self.bar(parameter.link) {
+            return parameter.kind != ParameterKind::Im && !bar.zero.contains(&parameter.kind);
+        }
         self.joints.get(parameter.link).is_some_and(|joint| match parameter.kind {
             ParameterKind::Im => joint.rotor_ratio.is_some(),
             kind => !joint.zero.contains(&kind),

@@ -2,8 +2,8 @@
 
 use super::table::{Reader, Table, Value, describe, two_brackets};
 use super::{
-    Angle, Arm, Convention, Frame, Grouping, Joint, JointKind, MAX_JOINTS, Parameter, ParameterKind,
-    Placement, mimic, servo, sum, transmission,
+    Angle, Arm, Bar, Convention, Frame, Grouping, Joint, JointKind, MAX_JOINTS, Parameter, ParameterKind,
+    Placement, loops, mimic, servo, sum, transmission,
 };
 use crate::diagnostic::{Collector, Diagnostics, is_unseen, unseen};
 use crate::exact::rational::{self, Rational};
@@ -11,8 +11,8 @@ use num_traits::{Signed, Zero};
 use std::ops::Range;
 use toml::de::DeTable;
 
-const ARM_KEYS: [&str; 9] =
-    ["name", "convention", "gravity", "joint", "base", "tool", "frame", "grouping", "transmission"];
+const ARM_KEYS: [&str; 10] =
+    ["name", "convention", "gravity", "joint", "loop", "base", "tool", "frame", "grouping", "transmission"];
 const FRAME_KEYS: [&str; 4] = ["name", "link", "xyz", "rpy"];
 const PLACEMENT_KEYS: [&str; 2] = ["xyz", "rpy"];
 const JOINT_KEYS: [&str; 17] = [
@@ -78,7 +78,7 @@ fn one_bracket(text: &str) -> Option<(Range<usize>, String)> {
 }
 
 /// The keys whose tables are entries of a list.
-const LISTS: [&str; 4] = ["joint", "frame", "transmission", "grouping"];
+const LISTS: [&str; 5] = ["joint", "loop", "frame", "transmission", "grouping"];
 
 /// Whether a module may have this name.
 pub(crate) fn is_name(name: &str) -> bool {
@@ -147,10 +147,16 @@ impl Reader<'_> {
         }
         let transmission_tables = self.tables(&top, "transmission");
         let transmissions = transmission::read(self, &transmission_tables, dof);
+        let loop_tables = self.tables(&top, "loop");
+        let mut whole: Option<Vec<Joint>> = joints.iter().cloned().collect();
+        let bars = match (&mut whole, convention) {
+            (Some(joints), Some(convention)) => loops::read(self, &loop_tables, convention, joints),
+            _ => None,
+        };
         let grouping_tables = self.tables(&top, "grouping");
         let mut groupings: Vec<Option<Grouping>> = Vec::new();
         for table in &grouping_tables {
-            let grouping = self.grouping(table, dof, &joints);
+            let grouping = self.grouping(table, &joints, bars.as_deref().unwrap_or_default());
             let earlier = grouping
                 .as_ref()
                 .and_then(|g| groupings.iter().flatten().position(|other: &Grouping| other.name == g.name));
@@ -162,7 +168,7 @@ impl Reader<'_> {
             }
             groupings.push(grouping);
         }
-        let mut joints: Vec<Joint> = joints.into_iter().collect::<Option<_>>()?;
+        let mut joints = whole?;
         if let Err((joint, why)) = mimic::resolve(&mut joints) {
             let t = &joint_tables[joint];
             self.errors.error(t.span.clone(), format!("{}: mimic: {why}", t.place));
@@ -179,6 +185,7 @@ impl Reader<'_> {
             frames: frames.into_iter().collect::<Option<_>>()?,
             groupings: groupings.into_iter().collect::<Option<_>>()?,
             transmissions: transmissions?,
+            bars: bars?,
         })
     }
 
@@ -268,7 +275,7 @@ impl Reader<'_> {
         Some(rational::to_f64(&value))
     }
 
-    fn symmetries(&mut self, v: &Value<'_>, place: &str) -> Option<Vec<ParameterKind>> {
+    pub(super) fn symmetries(&mut self, v: &Value<'_>, place: &str) -> Option<Vec<ParameterKind>> {
         let Some(list) = v.get_ref().as_array() else {
             self.errors.error(
                 v.span(),
@@ -313,7 +320,7 @@ impl Reader<'_> {
         sound.then_some(kinds)
     }
 
-    fn grouping(&mut self, t: &Table<'_, '_>, dof: usize, joints: &[Option<Joint>]) -> Option<Grouping> {
+    fn grouping(&mut self, t: &Table<'_, '_>, joints: &[Option<Joint>], bars: &[Bar]) -> Option<Grouping> {
         self.unknown_keys(t, &GROUPING_KEYS);
         let place = t.place.clone();
         let name = self.required(t, "name").and_then(|v| self.text(v, &format!("{place}: name")));
@@ -323,7 +330,7 @@ impl Reader<'_> {
                 Ok(terms) => {
                     let mut sound = true;
                     for (parameter, _) in &terms {
-                        if let Some(reason) = unusable(*parameter, dof, joints) {
+                        if let Some(reason) = unusable(*parameter, joints, bars) {
                             sound = false;
                             self.errors.error(v.span(), format!("{place}: {parameter} {reason}"));
                         }
@@ -459,9 +466,15 @@ impl Reader<'_> {
     }
 }
 
-fn unusable(parameter: Parameter, dof: usize, joints: &[Option<Joint>]) -> Option<String> {
-    if parameter.link >= dof {
-        return Some(format!("names link {} of an arm with {dof}", parameter.link + 1));
+fn unusable(parameter: Parameter, joints: &[Option<Joint>], bars: &[Bar]) -> Option<String> {
+    let bodies = joints.len() + bars.len();
+    if parameter.link >= bodies {
+        return Some(format!("names link {} of an arm with {bodies}", parameter.link + 1));
+    }
+    if let Some(bar) = parameter.link.checked_sub(joints.len()).map(|k| &bars[k]) {
+        let rotor = parameter.kind == ParameterKind::Im;
+        let zero = || bar.zero.contains(&parameter.kind).then(|| "is declared zero by its bar".to_string());
+        return if rotor { Some("is a rotor inertia, but bars have no rotor".to_string()) } else { zero() };
     }
     let joint = joints[parameter.link].as_ref()?;
     if parameter.kind == ParameterKind::Im {

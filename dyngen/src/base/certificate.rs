@@ -146,8 +146,8 @@ impl Source<Fp> for Point<'_> {
     fn ratio(&mut self, joint: usize) -> Fp {
         self.size(joint, 2, self.arm.joints[joint].rotor_ratio.as_ref())
     }
-    fn coupling(&mut self, factor: &Rational) -> Fp {
-        Fp::from_rational(factor).unwrap_or(Fp::ZERO)
+    fn exact(&mut self, value: &Rational) -> Fp {
+        Fp::from_rational(value).unwrap_or(Fp::ZERO)
     }
     fn gravity(&mut self, axis: usize) -> Fp {
         Fp::from_rational(&self.arm.gravity[axis]).unwrap_or(Fp::ZERO)

@@ -78,7 +78,7 @@ struct AllColumns {
 impl AllColumns {
     fn build(subject: &Subject<'_>) -> Self {
         let full = full_set(subject.arm, subject.field);
-        let mut place = vec![None; subject.arm.links() * 11];
+        let mut place = vec![None; subject.arm.all_parameters().len()];
         for (column, parameter) in full.parameters.iter().enumerate() {
             place[parameter.carriers[0].0.index()] = Some(column);
         }

@@ -42,7 +42,7 @@ pub fn all_rows(
     field: &ConstantField,
     sizes: Sizes,
 ) -> Result<Vec<SparseRow>, Unproven> {
-    if arm.has_mimics() {
+    if arm.has_mimics() || !arm.bars.is_empty() {
         return tied::all_rows(arm, symbols, field, sizes);
     }
     let chain = Steps::new(arm, symbols, field, sizes);

@@ -78,8 +78,8 @@ impl Source<Polynomial<i64>> for Variables<'_> {
     fn ratio(&mut self, joint: usize) -> Polynomial<i64> {
         self.of(Variable::Ratio(joint))
     }
-    fn coupling(&mut self, factor: &Rational) -> Polynomial<i64> {
-        let place = self.couplings.iter().position(|c| c == factor);
+    fn exact(&mut self, value: &Rational) -> Polynomial<i64> {
+        let place = self.couplings.iter().position(|c| c == value);
         self.of(Variable::Coupling(place.unwrap_or_default()))
     }
     fn gravity(&mut self, axis: usize) -> Polynomial<i64> {

@@ -27,7 +27,7 @@ impl Preference {
     /// along the joint axis and one of the two inertias across it.
     pub fn order(self, arm: &Arm) -> Vec<Parameter> {
         let mut order = arm.kept_parameters();
-        let link = |p: &Parameter| if self.outer { arm.links() - p.link } else { p.link };
+        let link = |p: &Parameter| if self.outer { arm.bodies() - p.link } else { p.link };
         order.sort_by_key(|p| (self.rank(arm, *p), link(p), p.kind));
         order
     }
@@ -41,7 +41,8 @@ impl Preference {
 
     fn rank(self, arm: &Arm, parameter: Parameter) -> u8 {
         use ParameterKind::*;
-        let joint = &arm.joints[parameter.link];
+        // What a bar shares with the links is theirs.
+        let Some(joint) = arm.joints.get(parameter.link) else { return 6 };
         let (along, across) =
             if axis_is_y(arm.convention, joint) { (My, [Ixx, Izz]) } else { (Mz, [Ixx, Iyy]) };
         let last_across = across[usize::from(!self.second_across)];

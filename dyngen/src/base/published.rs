@@ -106,7 +106,7 @@ fn lost(
             format!("{parameter} changes the torque, but is in no sum")
         } else {
             let instead = combination_text(field, &replacement);
-            let ratio = arm.joints[parameter.link].rotor_ratio.as_ref();
+            let ratio = arm.joints.get(parameter.link).and_then(|joint| joint.rotor_ratio.as_ref());
             let rotor = match (parameter.kind, ratio) {
                 (crate::arm::ParameterKind::Im, Some(k)) => format!(
                     " (rotor {} has ratio k = {}; its coupling enters with k, its own inertia with k²)",

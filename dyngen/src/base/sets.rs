@@ -66,7 +66,7 @@ impl Sets {
     /// [`Unproven`] where a number of the arm is a multiple of the proof's prime.
     pub fn derive(arm: &Arm, symbols: &AngleSymbols) -> Result<Sets, Unproven> {
         let field = ConstantField::new(symbols, joint_symbols(arm), &mut Draws::new(SEED));
-        let columns = arm.links() * 11;
+        let columns = arm.all_parameters().len();
         let eliminate_of = |arm: &Arm, rows: &[SparseRow], preference: Preference| {
             let order: Vec<usize> = preference.order(arm).iter().map(|p| p.index()).collect();
             // The result is certified by the Lagrangian itself below.
@@ -93,7 +93,8 @@ impl Sets {
             let (rank, relations) = relations(&field, &minimal, &set.parameters)?;
             (set.rank, set.relations) = (rank, relations);
         }
-        let on_joints = match arm.convention == Convention::Standard && joint_symbols(arm) > 0 {
+        let general = arm.convention == Convention::Standard && joint_symbols(arm) > 0;
+        let on_joints = match general && arm.bars.is_empty() {
             true => {
                 let chain = arm.on_joints();
                 let rows = coefficients::all_rows(&chain, symbols, &field, Sizes::Numbers)?;
@@ -110,7 +111,8 @@ impl Sets {
     /// The set `full` alone, and nothing known of how columns depend: enough for what takes no parameters.
     pub(crate) fn underived(arm: &Arm, symbols: &AngleSymbols) -> Sets {
         let field = ConstantField::new(symbols, joint_symbols(arm), &mut Draws::new(SEED));
-        let minimal = Dependence { kept: Vec::new(), coordinates: vec![Vec::new(); arm.links() * 11] };
+        let minimal =
+            Dependence { kept: Vec::new(), coordinates: vec![Vec::new(); arm.all_parameters().len()] };
         let sets = vec![full_set(arm, &field)];
         Sets { field, sets, minimal, on_joints: None, rows: Vec::new(), candidates: Vec::new() }
     }

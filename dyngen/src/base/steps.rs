@@ -134,8 +134,8 @@ impl Source<Numerator> for Quantities<'_> {
         let ratio = self.arm.joints[joint].rotor_ratio.clone().unwrap_or_default();
         self.size(RATIO, &ratio)
     }
-    fn coupling(&mut self, factor: &Rational) -> Numerator {
-        self.ring.constant(factor.clone())
+    fn exact(&mut self, value: &Rational) -> Numerator {
+        self.ring.constant(value.clone())
     }
     fn gravity(&mut self, axis: usize) -> Numerator {
         self.ring.constant(self.arm.gravity[axis].clone())

@@ -36,7 +36,7 @@ pub struct Symmetry {
 pub fn symmetries(arm: &Arm, sets: &Sets) -> Result<Vec<Symmetry>, Unproven> {
     let field = &sets.field;
     let mut without: Arm = arm.clone();
-    without.joints.iter_mut().for_each(|joint| joint.zero.clear());
+    (0..arm.bodies()).for_each(|body| without.declared_zero_mut(body).clear());
     let rows = coefficients::kept(&without, &sets.rows);
     let kept: Vec<usize> = Preference::ALL[0].order(arm).iter().map(|p| p.index()).collect();
     let all = arm.all_parameters();

@@ -195,8 +195,8 @@ impl<A: Algebra> Source<A::Value> for Quantities<'_, '_, A> {
         let ratio = self.algebraic.arm.joints[joint].rotor_ratio.clone().unwrap_or_default();
         self.size(joint, |sizes| &sizes.rotor_ratio, &ratio)
     }
-    fn coupling(&mut self, factor: &Rational) -> A::Value {
-        (self.algebraic.number)(factor)
+    fn exact(&mut self, value: &Rational) -> A::Value {
+        (self.algebraic.number)(value)
     }
     fn gravity(&mut self, axis: usize) -> A::Value {
         (self.algebraic.number)(&self.algebraic.arm.gravity[axis])

@@ -68,6 +68,7 @@ fn table(model: &Model, description: &Description, digits: Digits) -> String {
     joint_table(&mut t, arm, digits);
     frames(&mut t, arm, digits);
     followers(&mut t, arm, digits);
+    bars(&mut t, arm, digits);
     transmissions(&mut t, arm);
     classes(&mut t, model);
     symmetry_table(&mut t, model, symmetries, digits);
@@ -173,6 +174,22 @@ fn followers(t: &mut String, arm: &Arm, digits: Digits) {
                 number(&mimic.offset)
             );
         }
+    }
+}
+
+/// The bars of closed loops, which have the numbers after the links'.
+fn bars(t: &mut String, arm: &Arm, digits: Digits) {
+    let link = |link: Option<usize>| link.map_or("the base".to_string(), |link| format!("link {}", link + 1));
+    for (bar, number) in arm.bars.iter().zip(arm.links() + 1..) {
+        let pin = bar.pin.each_ref().map(|x| digits.number(rational::to_f64(x)));
+        let _ = writeln!(
+            t,
+            "  body {number}: bar {}, from a pin at [{}] m on {}; its axes are those of {}",
+            bar.name,
+            pin.join(", "),
+            link(bar.carrier),
+            link(bar.parallel)
+        );
     }
 }
 

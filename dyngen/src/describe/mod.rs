@@ -6,7 +6,7 @@ mod weak;
 pub use bounds::{ParameterRange, Rounding, why_unbounded};
 pub use weak::Weak;
 
-use crate::arm::{Arm, Joint, Transmission};
+use crate::arm::{Arm, Bar, Joint, Transmission};
 use crate::base::sets::{Class, combination_text};
 use crate::base::symmetry::{self, Removed, Symmetry};
 use crate::dynamics::{Function, FunctionGraph};
@@ -113,6 +113,7 @@ impl Description {
             "joints": arm.dof(),
             "joint_names": arm.joint_names(),
             "mimics": mimics_json(arm),
+            "bars": bars_json(arm),
             "transmissions": arm.transmissions.iter().map(transmission_json).collect::<Vec<_>>(),
             "parameters": names,
             "sets": sets_json(model),
@@ -174,6 +175,17 @@ fn mimics_json(arm: &Arm) -> Vec<Value> {
         Some(json!({"joint": joint, "follows": follows, "ratio": ratio, "offset": offset}))
     };
     arm.joints.iter().enumerate().filter_map(of).collect()
+}
+
+/// Bars of closed loops: bodies and links from 1, 0 is the base; the pin as exact text, m.
+fn bars_json(arm: &Arm) -> Vec<Value> {
+    let number = |link: Option<usize>| link.map_or(0, |link| link + 1);
+    let of = |(bar, body): (&Bar, usize)| {
+        let pin = bar.pin.each_ref().map(rational::to_text);
+        let (link, parallel) = (number(bar.carrier), number(bar.parallel));
+        json!({"name": bar.name, "body": body, "link": link, "pin": pin, "parallel": parallel})
+    };
+    arm.bars.iter().zip(arm.links() + 1..).map(of).collect()
 }
 
 /// Joints from 1; the matrix as exact text.

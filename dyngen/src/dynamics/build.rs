@@ -10,7 +10,7 @@ use super::regroup::{LinkBody, Regrouping};
 use super::stage::{Chain, Form};
 use super::task::{Task, sum_of_products};
 use super::total::Total;
-use super::{composite, coriolis, energy, forward, inverse, momentum, payload, pose, regressor};
+use super::{bars, composite, coriolis, energy, forward, inverse, momentum, payload, pose, regressor};
 use crate::arm::{Arm, Parameter, Placement};
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
@@ -190,8 +190,12 @@ impl<'a> Parts<'a> {
     ) -> Self {
         let Subject { arm, angles, symbols, field, .. } = subject;
         let elements = ArmElements::build(b, arm, symbols, &mut Inputs { b, arm, angles });
-        let chain = Chain::build(b, arm, angles, &elements, form);
+        let mut chain = Chain::build(b, arm, angles, &elements, form);
         let value = |i: usize| parameter(b, baked, i);
+        let of_bars = regrouping.map_or(Vec::new(), |r| r.bars(b, arm, field, set, value));
+        for (bar, parameters) in chain.bars.iter_mut().zip(&of_bars) {
+            *bar = bar.carrying(b, parameters);
+        }
         let bodies = regrouping.map_or(Vec::new(), |r| r.bodies(b, arm, symbols, field, set, value));
         let velocities = (0..arm.links()).map(|i| b.input(Input::Velocity(i))).collect();
         let geometry = chain::geometry(b, arm, form.origins, &elements);
@@ -235,12 +239,14 @@ impl<'a> Parts<'a> {
             }
             Function::MassMatrix => self.mass_matrix(),
             Function::MassMatrixInverse => forward::inverse_symmetric(b, &self.mass_matrix(), arm.dof()),
-            Function::CoriolisMatrix => self.square(coriolis::coriolis_matrix(b, chain, bodies, velocities)),
+            Function::CoriolisMatrix => self.coriolis_matrix(),
             Function::CoriolisTimesVelocity => self.torque(self.at_rest(), false),
             Function::CoriolisTransposeTimesVelocity => {
-                self.rows(momentum::coriolis_transpose_times_velocity(b, chain, bodies, velocities))
+                let bare = chain.without_bars();
+                let of_links = momentum::coriolis_transpose_times_velocity(b, &bare, bodies, velocities);
+                self.rows(bars::coriolis_transpose_times_velocity(b, chain, velocities, of_links))
             }
-            Function::Gravity => self.rows(composite::gravity(b, chain, bodies)),
+            Function::Gravity => self.gravity(),
             Function::ForwardDynamics => self.forward_dynamics(),
             Function::ForwardKinematics => pose::forward_kinematics(b, elements, &self.ends()),
             Function::Jacobian => self.jacobian(),
@@ -278,10 +284,8 @@ impl<'a> Parts<'a> {
             // Only the bodies differ from the functions without a payload.
             Function::InverseDynamicsWithPayload => self.torque(self.each(Input::Acceleration), true),
             Function::MassMatrixWithPayload => self.mass_matrix(),
-            Function::CoriolisMatrixWithPayload => {
-                self.square(coriolis::coriolis_matrix(b, chain, bodies, velocities))
-            }
-            Function::GravityWithPayload => self.rows(composite::gravity(b, chain, bodies)),
+            Function::CoriolisMatrixWithPayload => self.coriolis_matrix(),
+            Function::GravityWithPayload => self.gravity(),
             Function::ForwardDynamicsWithPayload => self.forward_dynamics(),
             Function::PayloadRegressor => self.payload_regressor(),
             Function::TorqueHessianTimes => self.torque_hessian_times(),
@@ -364,7 +368,19 @@ impl<'a> Parts<'a> {
     }
 
     fn mass_matrix(&self) -> Vec<Expr> {
-        self.square(composite::mass_matrix(self.b, &self.chain, &self.bodies))
+        let of_links = composite::mass_matrix(self.b, &self.chain, &self.bodies);
+        self.square(bars::mass_matrix(self.b, &self.chain, of_links))
+    }
+
+    fn coriolis_matrix(&self) -> Vec<Expr> {
+        let Parts { b, chain, bodies, velocities, .. } = self;
+        let of_links = coriolis::coriolis_matrix(b, chain, bodies, velocities);
+        self.square(bars::coriolis_matrix(b, chain, velocities, of_links))
+    }
+
+    fn gravity(&self) -> Vec<Expr> {
+        let of_links = composite::gravity(self.b, &self.chain, &self.bodies);
+        self.rows(bars::gravity(self.b, &self.chain, of_links))
     }
 
     /// M⁻¹·(τ − C·q̇ − g)
@@ -477,7 +493,8 @@ impl<'a> Parts<'a> {
     fn payload_regressor(&self) -> Vec<Expr> {
         let (b, links) = (self.b, self.subject.arm.links());
         let column = |parameter: usize| {
-            let mut only = Parts { bodies: vec![LinkBody::none(b); links], ..self.clone() };
+            let (bodies, chain) = (vec![LinkBody::none(b); links], self.chain.without_bars());
+            let mut only = Parts { bodies, chain, ..self.clone() };
             only.load(&payload::unit(b, self.carrier(), &self.ends().tool, parameter));
             only.turn_last();
             only.torque(self.each(Input::Acceleration), true)
@@ -569,8 +586,8 @@ impl Source<Expr> for Inputs<'_> {
     fn ratio(&mut self, joint: usize) -> Expr {
         self.arm.joints[joint].rotor_ratio.as_ref().map_or(Expr::ZERO, |k| self.b.constant(k))
     }
-    fn coupling(&mut self, factor: &Rational) -> Expr {
-        self.b.constant(factor)
+    fn exact(&mut self, value: &Rational) -> Expr {
+        self.b.constant(value)
     }
     fn gravity(&mut self, axis: usize) -> Expr {
         self.b.constant(&self.arm.gravity[axis])

@@ -1,6 +1,8 @@
 //! Inverse dynamics by the Newton–Euler recursion along the chain.
 
+use super::bars;
 use super::body::Vector;
+use super::moments::Moments;
 use super::motion::{Drive, LinkMotion, StageMotion, axis_rate, motions};
 use super::regroup::LinkBody;
 use super::stage::{Chain, Stage, back_z, plus, scaled};
@@ -41,14 +43,15 @@ pub fn inverse_dynamics(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: 
 /// The motion outwards, forces and moments inwards.
 pub fn newton_euler(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: &Drive) -> Passes {
     let motions = motions(b, chain, drive);
+    let of_bars = bars::wrenches(b, chain, &motions, drive);
     let mut felt = Vec::with_capacity(chain.stages.len());
     let mut torques = vec![Expr::ZERO; chain.dof()];
     let mut of_coupled = torques.clone();
     let mut outer = Wrench::NONE;
     for (stage, motion) in chain.stages.iter().zip(&motions).rev() {
         let (own, mut before) = match stage.kind {
-            JointKind::Revolute => revolute(b, chain, stage, motion, bodies, &outer),
-            JointKind::Prismatic => prismatic(b, stage, motion, bodies, &outer),
+            JointKind::Revolute => revolute(b, chain, stage, motion, (bodies, &of_bars), &outer),
+            JointKind::Prismatic => prismatic(b, stage, motion, (bodies, &of_bars), &outer),
         };
         // A joint's torque moves its own link and all after it.
         let (mut sum, mut wheels, mut spin) = (Expr::ZERO, Expr::ZERO, Expr::ZERO);
@@ -103,7 +106,7 @@ fn revolute(
     chain: &Chain,
     stage: &Stage,
     motion: &StageMotion,
-    bodies: &[LinkBody],
+    (bodies, of_bars): (&[LinkBody], &[Wrench]),
     outer: &Wrench,
 ) -> (Vec<Felt>, Wrench) {
     let nothing = Felt { torque: Expr::ZERO, wrench: Wrench::NONE, later: super::body::ZERO };
@@ -112,7 +115,7 @@ fn revolute(
     let (mut force, mut before) = (super::body::ZERO, Wrench::NONE);
     for (k, member) in stage.members.iter().enumerate().rev() {
         let (body, link) = (&bodies[member.joint], &motion.links[k]);
-        let mut here = body_wrench(b, body, link);
+        let mut here = moments_wrench(b, &body.moments, link).plus(b, &of_bars[member.joint]);
         let end = scaled(b, body.end_mass, &link.next);
         let last = k + 1 == stage.members.len();
         if last {
@@ -149,14 +152,15 @@ fn prismatic(
     b: &Builder,
     stage: &Stage,
     motion: &StageMotion,
-    bodies: &[LinkBody],
+    (bodies, of_bars): (&[LinkBody], &[Wrench]),
     outer: &Wrench,
 ) -> (Vec<Felt>, Wrench) {
     let (member, link) = (&stage.members[0], &motion.links[0]);
     let body = &bodies[member.joint];
     let end = scaled(b, body.end_mass, &link.next);
     let carried = Wrench { force: plus(b, &outer.force, &end), ..*outer }.shifted(b, &member.reach);
-    let here = body_wrench(b, body, link).plus(b, &carried);
+    let own = moments_wrench(b, &body.moments, link).plus(b, &of_bars[member.joint]);
+    let here = own.plus(b, &carried);
     let turned =
         Wrench { force: back_z(b, member.angle, &here.force), moment: back_z(b, member.angle, &here.moment) };
     let before = turned.shifted(b, &[Expr::ZERO, Expr::ZERO, stage.shift]);
@@ -164,8 +168,7 @@ fn prismatic(
 }
 
 /// The wrench of a body's motion: f = m a + U s, n = Σ J_ij e_i×(U e_j) + s×a.
-fn body_wrench(b: &Builder, body: &LinkBody, link: &LinkMotion) -> Wrench {
-    let moments = &body.moments;
+pub fn moments_wrench(b: &Builder, moments: &Moments<Expr>, link: &LinkMotion) -> Wrench {
     let mut wrench = Wrench::NONE;
     // First moments across the axis need U's diagonal unchanged.
     let diagonal_unused = moments.first[0] == Expr::ZERO && moments.first[1] == Expr::ZERO;

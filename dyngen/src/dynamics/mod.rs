@@ -1,6 +1,7 @@
 //! Kinematics and the recursions that are emitted, as graphs, one file a function.
 
 pub mod angles;
+pub mod bars;
 pub mod body;
 pub mod build;
 pub mod chain;

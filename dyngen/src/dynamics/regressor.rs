@@ -1,5 +1,6 @@
 //! The regressor: each parameter's wrench projected onto the motion of each coordinate.
 
+use super::bars;
 use super::body::{Vector, ZERO};
 use super::chain::LinkGeometry;
 use super::inverse::entry_wrench;
@@ -73,6 +74,7 @@ pub fn regressor(b: &Builder, chain: &Chain, columns: &Columns<'_>, drive: &Driv
         for (carrier, factor) in &parameter.carriers {
             let factor = super::body::constant(b, columns.field, factor);
             let own = match carrier.kind {
+                kind if carrier.link >= n => bars::column(b, chain, carrier.link - n, kind as usize, drive),
                 ParameterKind::Im => rotor_column(b, chain, &motions, &before, carrier.link),
                 _ => body_column(b, chain, columns, &views[carrier.link], *carrier),
             };

@@ -157,8 +157,8 @@ impl Source<Constant> for Constants<'_> {
     fn ratio(&mut self, _: usize) -> Constant {
         self.field.integer(1)
     }
-    fn coupling(&mut self, factor: &Rational) -> Constant {
-        self.number(factor)
+    fn exact(&mut self, value: &Rational) -> Constant {
+        self.number(value)
     }
     fn gravity(&mut self, axis: usize) -> Constant {
         self.number(&self.arm.gravity[axis])
@@ -367,7 +367,8 @@ impl Regrouping {
                 Column::Rotor(link) => add(&mut bodies[link].rotor, sum),
                 Column::Flywheel(link) => add(&mut bodies[link].flywheel, sum),
                 Column::Given(parameter) => {
-                    for (carrier, factor) in &set.parameters[parameter].carriers {
+                    let of_links = |(p, _): &&(Parameter, Constant)| p.link < arm.links();
+                    for (carrier, factor) in set.parameters[parameter].carriers.iter().filter(of_links) {
                         let x = term(factor, sum);
                         let body = &mut bodies[carrier.link];
                         if carrier.kind == ParameterKind::Im {
@@ -384,5 +385,28 @@ impl Regrouping {
             }
         }
         bodies
+    }
+
+    /// The ten parameters of each bar with the sums in place.
+    pub fn bars(
+        &self,
+        b: &Builder,
+        arm: &Arm,
+        field: &ConstantField,
+        set: &ParameterSet,
+        value: impl Fn(usize) -> Expr,
+    ) -> Vec<[Expr; ENTRIES]> {
+        let mut bars = vec![[Expr::ZERO; ENTRIES]; arm.bars.len()];
+        let term = |factor: &Constant, x: Expr| b.mul(&constant(b, field, factor), &x);
+        for (column, sum) in &self.columns {
+            let Column::Given(parameter) = *column else { continue };
+            for (carrier, factor) in &set.parameters[parameter].carriers {
+                let Some(bar) = carrier.link.checked_sub(arm.links()) else { continue };
+                let sum = sum.iter().fold(Expr::ZERO, |sum, (p, c)| b.add(&sum, &term(c, value(*p))));
+                let to = &mut bars[bar][carrier.kind as usize];
+                *to = b.add(to, &term(factor, sum));
+            }
+        }
+        bars
     }
 }

@@ -1,6 +1,7 @@
 //! The chain in expressions: stages of parallel axes with their angles, ready for a recursion.
 
 use super::angles::Angles;
+use super::bars::BarBody;
 use super::body::{Vector, ZERO};
 use super::chain::{self, LinkGeometry, Origins};
 use crate::arm::{Arm, JointKind};
@@ -89,6 +90,8 @@ pub struct Chain {
     pub form: Form,
     /// The angle by which the last link's moments are turned back; straight unless the form says so.
     pub last_turn: SinCos,
+    /// The bars of closed loops, without bodies until they are given.
+    pub bars: Vec<BarBody>,
 }
 
 impl Chain {
@@ -113,7 +116,14 @@ impl Chain {
                 member.step = STRAIGHT;
             }
         }
-        Chain { gravity: elements.gravity, stages, form, last_turn }
+        let mut chain = Chain { gravity: elements.gravity, stages, form, last_turn, bars: Vec::new() };
+        chain.bars = elements.bars.iter().map(|bar| BarBody::new(b, &chain, &links, bar)).collect();
+        chain
+    }
+
+    /// This chain without bars.
+    pub fn without_bars(&self) -> Chain {
+        Chain { bars: Vec::new(), ..self.clone() }
     }
 
     /// Number of joints.

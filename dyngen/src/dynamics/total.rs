@@ -3,14 +3,18 @@
 //! Bodies are those of the arm file, not the sums that torques depend on: moving mass from one link to the next keeps the
 //! torques but not the momentum.
 
+use super::body::ZERO;
 use super::composite::unit_momentum;
 use super::moments::Moments;
+use super::stage::{plus, scaled};
 use super::wrench::Wrench;
 use crate::arm::{Convention, Parameter, ParameterKind};
 use crate::exact::algebra::Algebra;
 use crate::exact::rational;
 use crate::graph::{Builder, Expr};
+use crate::lagrangian::bars::{BarElements, turned};
 use crate::lagrangian::elements::{ArmElements, JointElements, PlacementElements};
+use crate::lagrangian::{Motion, motions};
 
 /// All links together, about the origin and in the axes of the root link.
 pub(super) struct Total {
@@ -35,6 +39,7 @@ impl Total {
             let of = |i: usize| value(Parameter { link, kind: ParameterKind::ALL[i] });
             Moments::of_parameters(b, &half, &std::array::from_fn(of))
         };
+        let bars = || arm.bars.iter().zip(arm.joints.len()..).map(|(bar, link)| (bar, body(link)));
         let n = arm.joints.len();
         let mut total = Total { body: Moments::none(b), momenta: vec![Wrench::NONE; n] };
         for (i, joint) in arm.joints.iter().enumerate().rev() {
@@ -55,8 +60,26 @@ impl Total {
                 total.before_twist(b, joint);
             }
         }
+        for part in bars().flat_map(|(bar, body)| of_bar(b, arm, bar, &body)) {
+            total.body = total.body.plus(b, &part.body);
+            total.momenta = total.momenta.iter().zip(&part.momenta).map(|(x, y)| x.plus(b, y)).collect();
+        }
         total.before_placement(b, base);
         total
+    }
+
+    /// From the frame of a link to frame 0.
+    fn carried(mut self, b: &Builder, arm: &ArmElements<Expr>, link: Option<usize>) -> Total {
+        for joint in arm.joints[..link.map_or(0, |link| link + 1)].iter().rev() {
+            if arm.convention == Convention::Standard {
+                self.before_twist(b, joint);
+            }
+            self.before_screw(b, joint);
+            if arm.convention == Convention::Modified {
+                self.before_twist(b, joint);
+            }
+        }
+        self
     }
 
     /// Before Rz(θ) Tz(d).
@@ -96,4 +119,38 @@ impl Total {
         };
         (0..6).flat_map(|i| self.momenta.iter().map(move |m| entry(i, m))).collect()
     }
+}
+
+/// A bar in frame 0: what moves with its pin, and what turns with its parallel link.
+fn of_bar(b: &Builder, arm: &ArmElements<Expr>, bar: &BarElements<Expr>, body: &Moments<Expr>) -> [Total; 2] {
+    let momenta = (0..arm.joints.len()).map(|j| unit_momenta(b, arm, bar, body, j));
+    let (of_pin, of_turn) = momenta.unzip();
+    let none = Moments::none(b);
+    let mass = Moments { mass: body.mass, ..none.clone() }.shifted(b, &bar.pin);
+    let first = Moments { first: body.first, ..none };
+    [
+        Total { body: mass, momenta: of_pin }.carried(b, arm, bar.carrier),
+        Total { body: first, momenta: of_turn }.carried(b, arm, bar.parallel),
+    ]
+}
+
+/// A bar's momentum for a unit of a joint's velocity: m·v + ω×h at the pin on the link that carries it, I·ω + h×v on the
+/// link that it turns with, each about that link's origin and in its axes.
+fn unit_momenta(
+    b: &Builder,
+    arm: &ArmElements<Expr>,
+    bar: &BarElements<Expr>,
+    body: &Moments<Expr>,
+    joint: usize,
+) -> (Wrench, Wrench) {
+    let mut moving = ArmElements { gravity: ZERO, ..arm.clone() };
+    for (i, of) in moving.joints.iter_mut().enumerate() {
+        of.velocity = if i == joint { Expr::ONE } else { Expr::ZERO };
+    }
+    let rest = Motion::base(b, &moving);
+    let Motion { omega, velocity, .. } = bar.motion(b, arm, &rest, &motions(b, &moving));
+    let linear = plus(b, &scaled(b, body.mass, &velocity), &b.cross(&omega, &body.first));
+    let angular = plus(b, &body.inertia_times(b, &omega), &b.cross(&body.first, &velocity));
+    let force = turned(b, arm, &linear, bar.parallel, bar.carrier);
+    (Wrench { force, moment: ZERO }.shifted(b, &bar.pin), Wrench { force: ZERO, moment: angular })
 }

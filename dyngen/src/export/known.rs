@@ -44,6 +44,7 @@ impl Known {
     /// # Errors
     /// Missing values of the files: each link needs all its parameters, and they must be possible for a body.
     pub fn read(arm: &Arm, values: (&str, &str), friction: Option<(&str, &str)>) -> Result<Known, String> {
+        arm.without_bars("the export")?;
         let (text, file) = values;
         // Text that is not JSON, and keys that stand twice, are reported as for any values file.
         let json: Value = serde_json::from_str(text).map_err(|e| format!("{file}: not valid JSON: {e}"))?;

@@ -1,6 +1,7 @@
 //! From a URDF's tree of links to the chain of bodies between its root and a tip.
 
 use super::Options;
+use super::loops::{self, ChainLoop};
 use super::pose::Pose;
 use super::tree::Tree;
 use super::urdf::{Joint, Link, Mimic, Motor, Origin, Robot};
@@ -20,6 +21,8 @@ pub(crate) struct Chain {
     /// The tip link's frame.
     pub(crate) tip_pose: Pose,
     pub(crate) joints: Vec<ChainJoint>,
+    /// Parallelograms that close on it.
+    pub(crate) loops: Vec<ChainLoop>,
     /// The robot's joints from root to tip, those that do not move too.
     pub(crate) path: Vec<usize>,
     pub(crate) notes: Vec<String>,
@@ -91,10 +94,11 @@ pub(crate) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<Strin
         return Err(refused);
     }
     find_leaders(&mut joints, robot);
+    let loops = close_loops(&tree, options, &path, &mut joints, &mut notes);
     notes.extend(robot.notes.iter().cloned());
     notes.extend(without_mass(&joints));
     let gravity = robot.gravity.map_or(GRAVITY, Vector3::from);
-    Ok(Chain { name: robot.name.clone(), root, gravity, tip, tip_pose: pose, joints, path, notes })
+    Ok(Chain { name: robot.name.clone(), root, gravity, tip, tip_pose: pose, joints, loops, path, notes })
 }
 
 /// The link at the chain's end, and the joints from the root to it; why there is none.
@@ -131,6 +135,35 @@ fn find_leaders(joints: &mut [ChainJoint], robot: &Robot) {
         let mimic = robot.joints.iter().find(|j| j.name == joint.name).and_then(|j| j.mimic.clone());
         joint.follows = mimic.and_then(|m| Some((names.iter().position(|n| *n == m.joint)?, m)));
     }
+}
+
+/// The loops that a file's equalities close on the chain, and notes about those that are none.
+fn close_loops(
+    tree: &Tree<'_>,
+    options: &Options,
+    path: &[usize],
+    joints: &mut [ChainJoint],
+    notes: &mut Vec<String>,
+) -> Vec<ChainLoop> {
+    let mut found = Vec::new();
+    for connect in &tree.robot.connects {
+        match loops::close(tree, options.angle_tolerance, path, joints, connect) {
+            Ok((closed, more)) => {
+                // Its bars are bodies of the arm.
+                let of_bar = |note: &String| {
+                    let left = |pin: &String| note.starts_with(&format!("left out: joint '{pin}' on "));
+                    closed.pins.iter().any(left)
+                };
+                notes.retain(|note| !of_bar(note));
+                notes.extend(more);
+                found.push(closed);
+            }
+            Err(why) => {
+                notes.push(format!("line {}: the equality <connect> is left out: {why}", connect.line));
+            }
+        }
+    }
+    found
 }
 
 /// What to report about joints behind which no link has mass.
@@ -251,14 +284,7 @@ impl Walk<'_> {
             self.refused.push(format!("joint '{}': its axis {:?} has no direction", joint.name, joint.axis));
             return pose;
         }
-        let moved = match joint.kind.as_str() {
-            "prismatic" => Pose { rotation: Matrix3::identity(), origin: axis.normalize() * *value },
-            _ => Pose {
-                rotation: Rotation3::new(axis.normalize() * *value).into_inner(),
-                origin: Vector3::zeros(),
-            },
-        };
-        pose.then(&moved)
+        pose.then(&held(joint, *value))
     }
 
     /// Adds a link and all that is fixed to it to the body of the last joint.
@@ -314,17 +340,14 @@ impl Walk<'_> {
         } else if mass < 0.0 {
             self.refused.push(format!("{place}: its mass {mass} kg is negative"));
         }
-        let frame = self.origin(&link.origin, pose, &format!("{place}: inertial"));
+        self.origin(&link.origin, pose, &format!("{place}: inertial"));
         if let Some(joint) = self.joints.last_mut() {
             joint.links.push(link.name.clone());
             joint.poses.push(*pose);
             if let Some(reason) = impossible(mass, &tensor) {
                 self.notes.push(format!("{place}: {reason}"));
             }
-            if mass != 0.0 || tensor.iter().any(|x| *x != 0.0) {
-                let inertia = frame.rotation * tensor * frame.rotation.transpose();
-                joint.masses.push(Mass { mass, centre: frame.origin, inertia });
-            }
+            joint.masses.extend(masses(link, pose, self.options.angle_tolerance));
         }
     }
 
@@ -334,6 +357,25 @@ impl Walk<'_> {
         }
         parent.then(&Pose::of(origin, self.options.angle_tolerance))
     }
+}
+
+/// How a joint that is held at a position moves what is behind it.
+pub(super) fn held(joint: &Joint, value: f64) -> Pose {
+    let way = Vector3::from(joint.axis).normalize() * value;
+    match joint.kind.as_str() {
+        "prismatic" => Pose { rotation: Matrix3::identity(), origin: way },
+        _ => Pose { rotation: Rotation3::new(way).into_inner(), origin: Vector3::zeros() },
+    }
+}
+
+/// The inertia of a link in the frame in which its pose is given; none without mass.
+pub(super) fn masses(link: &Link, pose: &Pose, tolerance: f64) -> Option<Mass> {
+    let (mass, [xx, xy, xz, yy, yz, zz]) = (link.mass, link.inertia);
+    let tensor = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    let frame = pose.then(&Pose::of(&link.origin, tolerance));
+    let inertia = frame.rotation * tensor * frame.rotation.transpose();
+    let heavy = mass != 0.0 || tensor.iter().any(|x| *x != 0.0);
+    heavy.then_some(Mass { mass, centre: frame.origin, inertia })
 }
 
 /// Finite, and not so large that it stands for infinity.

@@ -1,5 +1,6 @@
 //! What MuJoCo holds by equalities: a joint that follows another one, or what an arm file cannot hold.
 
+use super::mjcf::WORLD;
 use super::numbers::finite;
 use roxmltree::Node;
 
@@ -9,6 +10,8 @@ pub(super) enum Equality {
     Follows { joint: String, leader: String, offset: f64, ratio: f64 },
     /// A joint stands at an offset from its reference.
     Stands { joint: String, offset: f64 },
+    /// Two bodies, or the bodies of two sites, have a point in common; where no site is named it is given in the first.
+    Connects { bodies: [String; 2], sites: Option<[String; 2]>, anchor: [f64; 3] },
     /// Why it is left out.
     LeftOut(&'static str),
 }
@@ -21,8 +24,13 @@ pub(super) fn read(node: Node<'_, '_>) -> Result<Option<Equality>, String> {
     if node.attribute("active") == Some("false") {
         return Ok(None);
     }
+    if node.has_tag_name("connect") {
+        return connect(node).map(Some);
+    }
     if !node.has_tag_name("joint") {
-        return Ok(Some(Equality::LeftOut("an arm file has no closed loops and no tendons")));
+        return Ok(Some(Equality::LeftOut(
+            "of equalities an arm file has joints that follow and loops of hinges",
+        )));
     }
     let [offset, ratio, curve @ ..] = coefficients(node)?;
     let name = |key: &str| node.attribute(key).unwrap_or("").to_string();
@@ -34,6 +42,19 @@ pub(super) fn read(node: Node<'_, '_>) -> Result<Option<Equality>, String> {
     } else {
         Equality::Follows { joint, leader, offset, ratio }
     }))
+}
+
+fn connect(node: Node<'_, '_>) -> Result<Equality, String> {
+    let name = |key: &str| node.attribute(key).map(str::to_string);
+    let sites = name("site1").zip(name("site2")).map(|(one, other)| [one, other]);
+    let wrong = || "anchor of <connect> must be 3 numbers".to_string();
+    let anchor = match (node.attribute("anchor"), &sites) {
+        (Some(text), _) => finite(text).and_then(|n| n.try_into().ok()).ok_or_else(wrong)?,
+        (None, Some(_)) => [0.0; 3],
+        (None, None) => return Err(wrong()),
+    };
+    let body = |key: &str| name(key).unwrap_or_else(|| WORLD.to_string());
+    Ok(Equality::Connects { bodies: [body("body1"), body("body2")], sites, anchor })
 }
 
 /// Of the polynomial by which a joint follows another.

@@ -9,13 +9,13 @@ use super::numbers::finite;
 use super::orientation::{Angles, turn};
 use super::pose::Pose;
 use super::shapes::{GROUPS, Solid};
-use super::urdf::{Joint, Link, Mimic, Motor, Origin, Robot, broken, nested};
+use super::urdf::{Connect, Joint, Link, Mimic, Motor, Origin, Robot, broken, nested};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::BTreeMap;
 
 /// What the body that stands still is called in MuJoCo.
-const WORLD: &str = "world";
+pub(super) const WORLD: &str = "world";
 /// Elements of which MuJoCo makes bodies when it compiles.
 const UNREADABLE: [&str; 5] = ["include", "attach", "replicate", "composite", "flexcomp"];
 
@@ -186,6 +186,12 @@ impl<'d, 'i> Reader<'d, 'i> {
                 let what = left_out(&format!("it holds joint '{joint}', as --lock {joint}={held} does"));
                 self.robot.notes.push(what);
             }
+            Ok(Some(Equality::Connects { bodies, sites, anchor })) => {
+                match self.connect(bodies, sites, anchor) {
+                    Ok((links, anchor)) => self.robot.connects.push(Connect { line, links, anchor }),
+                    Err(message) => self.error(node, message),
+                }
+            }
             Ok(Some(Equality::Follows { joint, leader, offset, ratio })) => {
                 let offset = offset + reference(&joint) - ratio * reference(&leader);
                 match self.robot.joints.iter_mut().find(|j| j.name == joint) {
@@ -195,6 +201,32 @@ impl<'d, 'i> Reader<'d, 'i> {
             }
             Err(message) => self.error(node, message),
         }
+    }
+
+    /// The links that a `<connect>` holds together, and the point in the first.
+    fn connect(
+        &self,
+        bodies: [String; 2],
+        sites: Option<[String; 2]>,
+        anchor: [f64; 3],
+    ) -> Result<([String; 2], [f64; 3]), String> {
+        let links = &self.robot.links;
+        let Some(sites) = sites else {
+            let missing = bodies.iter().find(|body| !links.iter().any(|link| link.name == **body));
+            return match missing {
+                Some(body) => Err(format!("<connect>: there is no body '{body}'")),
+                None => Ok((bodies, anchor)),
+            };
+        };
+        let of = |site: &String| {
+            let at = |link: &Link| {
+                let (_, origin) = link.sites.iter().find(|(name, _)| name == site)?;
+                Some((link.name.clone(), origin.xyz))
+            };
+            links.iter().find_map(at).ok_or_else(|| format!("<connect>: there is no site '{site}' on a body"))
+        };
+        let ((one, anchor), (other, _)) = (of(&sites[0])?, of(&sites[1])?);
+        Ok(([one, other], anchor))
     }
 
     fn compiler(&mut self, node: Node<'d, 'i>) {

@@ -15,6 +15,7 @@ pub(crate) mod chain;
 mod change;
 mod equality;
 mod frames;
+mod loops;
 pub(crate) mod mjcf;
 mod numbers;
 mod orientation;
@@ -195,7 +196,7 @@ fn imported(robot: urdf::Robot, source: &Source, options: &Options) -> Result<Im
         .map_err(|e| refused(e.0.into_iter().map(|d| format!("as an arm file: {}", d.message)).collect()))?;
     let base = frames.base.rows();
     let heavy = chain.joints.iter().any(|joint| !joint.masses.is_empty());
-    let values = if heavy { text::values(&chain, &frames) } else { Vec::new() };
+    let values = if heavy { text::values(&chain, &frames, &arm) } else { Vec::new() };
     Ok(Imported { arm, text, values, base, notes: chain.notes })
 }
 

@@ -1,10 +1,11 @@
 //! The arm file of an imported chain, and the inertial values in its frames.
 
 use super::Options;
-use super::chain::{Chain, ChainJoint};
+use super::chain::{Chain, ChainJoint, Mass};
 use super::frames::{Frames, Row};
+use super::loops::ChainLoop;
 use super::pose::{Pose, twelfths};
-use crate::arm::{Convention, JointKind, Parameter, ParameterKind, is_name};
+use crate::arm::{Arm, Convention, JointKind, Parameter, ParameterKind, is_name};
 use crate::consistency::parameters_of_body;
 use crate::diagnostic::is_unseen;
 use crate::exact::angle::Angle;
@@ -24,6 +25,9 @@ pub(super) fn arm_file(chain: &Chain, frames: &Frames, file: &str, options: &Opt
         drive(&mut text, joint);
         limits(&mut text, joint);
         link_frame(&mut text, joint, link, options);
+    }
+    for closed in &chain.loops {
+        loop_table(&mut text, closed, chain, frames, options.angle_tolerance);
     }
     let (base, tool) =
         (format!("frame 0 in link '{}'", chain.root), format!("link '{}' in the last frame", chain.tip));
@@ -116,6 +120,33 @@ fn table_of_joint(text: &mut String, joint: &ChainJoint, row: &Row, tolerance: f
     }
 }
 
+/// A loop that closes on the chain.
+fn loop_table(text: &mut String, closed: &ChainLoop, chain: &Chain, frames: &Frames, tolerance: f64) {
+    let (first, last) = (closed.first, closed.last);
+    let joints: Vec<String> = (first..=last).map(|k| (k + 1).to_string()).collect();
+    let pins = closed.pins.iter().map(|pin| format!("\"{}\"", quoted(pin)));
+    let joints: Vec<String> = joints.into_iter().chain(pins).collect();
+    let lengths: Vec<String> = closed.lengths.iter().map(|x| length(*x)).collect();
+    // From the x axis of a joint's row at q = 0, about its z.
+    let from_x = |joint: usize, way: &Vector3<f64>| {
+        let (x, z) = (frames.links[joint].rotation.column(0).into_owned(), chain.joints[joint].direction);
+        z.dot(&x.cross(way)).atan2(x.dot(way))
+    };
+    let (outer, inner) =
+        (from_x(last, &closed.outer), from_x(first, &closed.inner) + frames.rows[first].theta);
+    let bars: Vec<String> =
+        closed.bars.iter().map(|bar| format!("{{ name = \"{}\" }}", quoted(&bar.name))).collect();
+    let _ = write!(
+        text,
+        "\n[[loop]]\njoints = [{}]\nlengths = [{}]\nouter = {}\ninner = {}\nbar = [{}]\n",
+        joints.join(", "),
+        lengths.join(", "),
+        angle(outer, tolerance),
+        angle(inner.sin().atan2(inner.cos()), tolerance),
+        bars.join(", ")
+    );
+}
+
 /// The ratio of a joint's gear, and what the file states about its friction.
 fn drive(text: &mut String, joint: &ChainJoint) {
     let Some(motor) = joint.motor else { return };
@@ -178,12 +209,20 @@ fn ratio(joint: &ChainJoint) -> Option<f64> {
     Some(motor.gear.unwrap_or(RATIO))
 }
 
-/// The inertial parameters of every link in its new frame.
-pub(super) fn values(chain: &Chain, frames: &Frames) -> Vec<(Parameter, f64)> {
+/// The inertial parameters of every link in its new frame, then of every bar.
+pub(super) fn values(chain: &Chain, frames: &Frames, arm: &Arm) -> Vec<(Parameter, f64)> {
     let links = chain.joints.iter().zip(&frames.links).enumerate();
+    let bars = chain.loops.iter().flat_map(|closed| &closed.bars).zip(&arm.bars).zip(arm.links()..);
+    let of_bars = bars.flat_map(|((bar, of), link)| {
+        let frame = |link: Option<usize>| link.map_or(&frames.base, |link| &frames.links[link]);
+        let pin = Vector3::from(of.pin.each_ref().map(rational::to_f64));
+        let frame = Pose { rotation: frame(of.parallel).rotation, origin: frame(of.carrier).point(pin) };
+        let values = link_values(&bar.masses, &frame);
+        ParameterKind::ALL.into_iter().zip(values).map(move |(kind, value)| (Parameter { link, kind }, value))
+    });
     links
         .flat_map(|(link, (joint, frame))| {
-            let values = link_values(joint, frame).map(|x| if x == 0.0 { 0.0 } else { x });
+            let values = link_values(&joint.masses, frame).map(|x| if x == 0.0 { 0.0 } else { x });
             let armature = joint.motor.map_or(0.0, |motor| motor.armature);
             let rotor = ratio(joint).map(|ratio| armature / (ratio * ratio));
             ParameterKind::ALL
@@ -191,13 +230,14 @@ pub(super) fn values(chain: &Chain, frames: &Frames) -> Vec<(Parameter, f64)> {
                 .zip(values.into_iter().chain(rotor))
                 .map(move |(kind, value)| (Parameter { link, kind }, value))
         })
+        .chain(of_bars)
         .collect()
 }
 
-fn link_values(joint: &ChainJoint, frame: &Pose) -> [f64; 10] {
+fn link_values(masses: &[Mass], frame: &Pose) -> [f64; 10] {
     let (mut mass, mut moment, mut tensor) = (0.0, Vector3::zeros(), Matrix3::zeros());
     let back = frame.rotation.transpose();
-    for body in &joint.masses {
+    for body in masses {
         let r = back * (body.centre - frame.origin);
         mass += body.mass;
         moment += r * body.mass;

@@ -9,6 +9,8 @@ pub(crate) struct Robot {
     pub(crate) name: String,
     pub(crate) links: Vec<Link>,
     pub(crate) joints: Vec<Joint>,
+    /// Points where links are held together in addition to their joints.
+    pub(crate) connects: Vec<Connect>,
     /// Gravity in the root link, where the file says it, m/s².
     pub(crate) gravity: Option<[f64; 3]>,
     /// What of the file is left out, whatever chain is taken.
@@ -56,6 +58,16 @@ pub(crate) struct Joint {
     pub(crate) motor: Option<Motor>,
     /// What may surprise, where it is a joint of the chain.
     pub(crate) note: Option<String>,
+}
+
+/// Two links that have a point in common where all joints are at zero.
+#[derive(Clone, Debug)]
+pub(crate) struct Connect {
+    /// In the file, from 1.
+    pub(crate) line: u32,
+    pub(crate) links: [String; 2],
+    /// The point in the first link's frame, m.
+    pub(crate) anchor: [f64; 3],
 }
 
 /// What a joint follows: its position is ratio · the other's + offset.

@@ -1,5 +1,6 @@
 //! The quantities of an arm's kinematics as elements of an algebra.
 
+use super::bars::BarElements;
 use crate::arm::{Angle, Arm, Convention, JointKind, Placement};
 use crate::exact::algebra::Algebra;
 use crate::exact::rational::Rational;
@@ -61,6 +62,8 @@ pub struct ArmElements<V> {
     pub gravity: [V; 3],
     /// The joints from the base.
     pub joints: Vec<JointElements<V>>,
+    /// The bars of closed loops.
+    pub bars: Vec<BarElements<V>>,
 }
 
 /// The place of a frame in another: the tool's in the last link's, frame 0's in the root link's.
@@ -133,8 +136,9 @@ pub trait Source<V> {
     fn d(&mut self, joint: usize) -> V;
     /// Gear ratio.
     fn ratio(&mut self, joint: usize) -> V;
-    /// How fast a motor turns with a joint, an entry of the transmission's matrix; a constant of the arm.
-    fn coupling(&mut self, factor: &Rational) -> V;
+    /// A number of the arm that is none of its sizes: an entry of a transmission's matrix, a coordinate of the
+    /// pin of a bar.
+    fn exact(&mut self, value: &Rational) -> V;
     /// Component of gravity; requested only if it is not zero.
     fn gravity(&mut self, axis: usize) -> V;
     /// Sine or cosine of an angle symbol.
@@ -183,7 +187,7 @@ impl<V: Clone> ArmElements<V> {
         for motor in 0..joints.len() {
             if let Some(row) = arm.coupled_motor(motor) {
                 let term = |(joint, factor): &(usize, Rational)| {
-                    algebra.mul(&source.coupling(factor), &joints[*joint].velocity)
+                    algebra.mul(&source.exact(factor), &joints[*joint].velocity)
                 };
                 let terms: Vec<V> = row.iter().map(term).collect();
                 joints[motor].motor_velocity =
@@ -193,7 +197,9 @@ impl<V: Clone> ArmElements<V> {
         let gravity = std::array::from_fn(|axis| {
             if arm.gravity[axis].is_zero() { algebra.integer(0) } else { source.gravity(axis) }
         });
-        ArmElements { convention: arm.convention, gravity, joints }
+        let bar = |bar| BarElements::build(algebra, bar, &mut |x| source.exact(x));
+        let bars = arm.bars.iter().map(bar).collect();
+        ArmElements { convention: arm.convention, gravity, joints, bars }
     }
 }
 

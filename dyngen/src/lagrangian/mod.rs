@@ -1,6 +1,7 @@
 //! The Lagrangian of Eq. 5 and 6, linear in the dynamic parameters: all other results are derived from this
 //! definition or proven against it.
 
+pub mod bars;
 pub mod elements;
 pub mod followers;
 
@@ -21,7 +22,7 @@ pub struct Motion<V> {
     pub height: V,
 }
 
-/// Twice the coefficient of every dynamic parameter in the Lagrangian, eleven a link in the order of Eq. 10:
+/// Twice the coefficient of every dynamic parameter in the Lagrangian, eleven a link, then a bar, in the order of Eq. 10:
 /// L = ½ Σ columns·π.
 ///
 /// Twice, so that integer polynomials stay integer. Positions of frame origins enter the potential
@@ -36,14 +37,28 @@ pub fn twice_lagrangian_on<A: Algebra>(
     arm: &ArmElements<A::Value>,
     base: Motion<A::Value>,
 ) -> Vec<A::Value> {
-    let mut state = base;
-    let mut columns = Vec::with_capacity(arm.joints.len() * ParameterKind::ALL.len());
+    let mut columns = Vec::with_capacity((arm.joints.len() + arm.bars.len()) * ParameterKind::ALL.len());
+    let mut links: Vec<Motion<A::Value>> = Vec::with_capacity(arm.joints.len());
     for joint in &arm.joints {
+        let mut state = links.last().unwrap_or(&base).clone();
         let axis = step(alg, arm.convention, joint, &mut state);
         columns.extend(link_columns(alg, &state));
         columns.push(axis.rotor);
+        links.push(state);
+    }
+    for bar in &arm.bars {
+        columns.extend(bar.columns(alg, arm, &base, &links));
     }
     columns
+}
+
+/// The motions of the frames of all links, where frame 0 rests under gravity.
+pub fn motions<A: Algebra>(alg: &A, arm: &ArmElements<A::Value>) -> Vec<Motion<A::Value>> {
+    let next = |state: &mut Motion<A::Value>, joint| {
+        step(alg, arm.convention, joint, state);
+        Some(state.clone())
+    };
+    arm.joints.iter().scan(Motion::base(alg, arm), next).collect()
 }
 
 /// Twice the coefficients of the ten inertial parameters of a body that is fixed to the tool's frame of a link.

@@ -179,8 +179,8 @@ impl<A: OverPrime> Source<Jet<A::Value>> for JetSource<'_, '_, A> {
     fn ratio(&mut self, joint: usize) -> Jet<A::Value> {
         self.jets.constant(self.kinematics.ratio(joint))
     }
-    fn coupling(&mut self, factor: &Rational) -> Jet<A::Value> {
-        self.jets.constant(self.kinematics.coupling(factor))
+    fn exact(&mut self, value: &Rational) -> Jet<A::Value> {
+        self.jets.constant(self.kinematics.exact(value))
     }
     fn gravity(&mut self, axis: usize) -> Jet<A::Value> {
         match self.gravity {

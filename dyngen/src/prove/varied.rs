@@ -101,8 +101,8 @@ impl<A: OverPrime> Source<A::Value> for Varied<'_, '_, A> {
         let ratio = &self.point.arm.joints[joint].rotor_ratio;
         ratio.as_ref().map_or(self.algebra.integer(0), |k| self.number(k))
     }
-    fn coupling(&mut self, factor: &Rational) -> A::Value {
-        self.number(factor)
+    fn exact(&mut self, value: &Rational) -> A::Value {
+        self.number(value)
     }
     fn gravity(&mut self, axis: usize) -> A::Value {
         self.number(&self.point.arm.gravity[axis])

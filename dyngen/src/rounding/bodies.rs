@@ -39,11 +39,14 @@ struct Axis {
 }
 
 /// The ranges for `values` of the full set; `None` where a link is no body with mass and volume, or the energy is more than
-/// that of the links: rotors, joints that follow others.
+/// that of the links: rotors, bars of loops, joints that follow others.
 pub(super) fn factors(arm: &Arm, set: &ParameterSet, values: &[f64], mass: &MassMatrix) -> Option<Factors> {
     let most = mass.largest_diagonal(HALVINGS)?;
     let n = most.len();
-    if arm.joints.len() != n || arm.joints.iter().any(|joint| joint.rotor_ratio.is_some()) {
+    if arm.joints.len() != n
+        || !arm.bars.is_empty()
+        || arm.joints.iter().any(|joint| joint.rotor_ratio.is_some())
+    {
         return None;
     }
     let bodies: Option<Vec<Body>> = (0..n).map(|link| Body::of(arm, set, values, link)).collect();

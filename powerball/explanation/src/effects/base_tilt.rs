@@ -147,7 +147,7 @@ fn moments(context: &Context<'_>, tilt: &[f64], found: &[f64]) -> Vec<f64> {
         own.iter().map(|column| unit.iter().zip(found).map(|(u, c)| c * product(column, u)).sum()).collect();
     let much = Solver::new(&gram, |_| true).solve(&right);
     let gain = |k: usize| gravity_unobservable.iter().zip(&much).map(|(direction, m)| m * direction[k]).sum();
-    (0..ParameterKind::ALL.len() * context.data.dof()).map(gain).collect()
+    (0..context.data.body.arm().all_parameters().len()).map(gain).collect()
 }
 
 /// The change of gravity for a turn about x and about y: −(e_x × g) and −(e_y × g).

@@ -59,8 +59,11 @@ impl Effect for BrokenSymmetry {
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
         let zero = context.data.declared_zero();
+        let arm = context.data.body.arm();
         let on = |parameter: &Parameter| {
-            let joint = JointNumber::from_index(parameter.link);
+            // A bar has no joint of its own: the last one that moves it.
+            let of_bar = arm.bar(parameter.link).map(|bar| bar.carrier.max(bar.parallel).unwrap_or(0));
+            let joint = JointNumber::from_index(of_bar.unwrap_or(parameter.link));
             Candidate::on(joint, Settings { parameter: *parameter }, zero.len())
         };
         zero.iter().map(on).collect()

@@ -1,4 +1,4 @@
-//! A body on any link as columns: first moment and mass about the link's joint, and its inertia there.
+//! A body on any link, or on a bar of a closed loop, as columns: first moment and mass about the link's joint, and its inertia there.
 
 use super::Context;
 use nalgebra::{Matrix3, Vector3};
@@ -53,7 +53,8 @@ pub(super) fn direction(c: &[f64]) -> Option<[f64; 3]> {
 /// The origin of a link's joint in the link's frame, m: where it is fixed in the link, else that of the frame.
 fn joint(context: &Context<'_>, link: usize) -> Vector3<f64> {
     let chain = Chain::new(context.data.body.arm());
-    let row = &chain.rows()[link];
+    // A bar's frame is at its pin.
+    let Some(row) = chain.rows().get(link) else { return Vector3::zeros() };
     if !row.offset_turns() {
         return Vector3::zeros();
     }
@@ -88,7 +89,7 @@ pub(super) fn columns(context: &Context<'_>, link: usize, along: Option<[f64; 3]
                 }
                 (j, Arc::new(values))
             };
-            Column { parts: (0..=link).map(part).collect() }
+            Column { parts: (0..context.data.dof().min(link + 1)).map(part).collect() }
         })
         .collect()
 }

@@ -1,4 +1,4 @@
-//! A body held by the last link or carried by another one, from the start of a log or from some time on, to its
+//! A body held by the last link or carried by another one, or by a bar of a closed loop, from the start of a log or from some time on, to its
 //! end or to some time.
 
 use super::link_body::{self, Body};
@@ -60,7 +60,10 @@ pub struct Figures {
     /// link.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_moment: Option<[f64; 3]>,
-    /// The link that carries the body, if it is not the last one.
+    /// The name of the bar that carries the body, where that is no link of the chain.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bar: Option<String>,
+    /// The link, or the bar by its number after them, that carries the body, if it is not the last one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<JointNumber>,
     /// Mass of the body, kg; nothing where only its first moment shows.
@@ -86,7 +89,11 @@ impl Figures {
             }
             (None, ..) => "a body".to_string(),
         };
-        let link = self.link.map_or_else(|| "the last link".to_string(), |link| format!("link {link}"));
+        let link = match (&self.bar, self.link) {
+            (Some(bar), _) => format!("bar {bar}"),
+            (None, Some(link)) => format!("link {link}"),
+            (None, None) => "the last link".to_string(),
+        };
         let times = self.start_time.iter().enumerate().map(|(k, from)| {
             match self.end_time.get(k).copied().flatten() {
                 Some(to) => format!("{} to {} s", number(*from), number(to)),
@@ -141,8 +148,14 @@ impl Effect for Payload {
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        let others = (0..context.data.dof().saturating_sub(1)).map(Some);
-        std::iter::once(None).chain(others).filter_map(|link| search(context, link)).collect()
+        let (dof, bodies) = (context.data.dof(), context.data.body.arm().bodies());
+        let links = std::iter::once(None).chain((0..dof.saturating_sub(1)).map(Some));
+        let mut found: Vec<(Candidate, f64)> = links.filter_map(|link| search(context, link)).collect();
+        // A bar of a loop moves much like the link that it turns with: only what no link explains is on it.
+        let most = found.iter().map(|(_, explained)| *explained).fold(0.0, f64::max);
+        let bars = (dof..bodies).filter_map(|bar| search(context, Some(bar)));
+        found.extend(bars.filter(|(_, explained)| *explained > most + context.rule.least_score));
+        found.into_iter().map(|(candidate, _)| candidate).collect()
     }
 
     /// One body at a time.
@@ -260,6 +273,7 @@ impl Effect for Payload {
             com: point.map(|(_, com)| com),
             com_in_link: point.map(|(_, com)| arm.in_link_frame(on, com)),
             first_moment: body.map(|body| body.moment.into()),
+            bar: link.and_then(|link| arm.arm().bar(link)).map(|bar| bar.name.clone()),
             link: link.map(JointNumber::from_index),
             end_time: Window::ends(windows),
             mass: point.map(|(mass, _)| mass),
@@ -328,8 +342,8 @@ fn own_inertia(context: &Context<'_>) -> Option<Column> {
     Some(column)
 }
 
-/// When each log has it, as explains most, and which logs share it.
-fn search(context: &Context<'_>, link: Option<usize>) -> Option<Candidate> {
+/// When each log has it, as explains most, and which logs share it; and how much it explains.
+fn search(context: &Context<'_>, link: Option<usize>) -> Option<(Candidate, f64)> {
     let (data, fit) = (context.data, context.fit);
     let settings = Settings { com: None, stays: false, link, inertia: Inertia::OfPoint };
     let columns = columns_of(context, &settings);
@@ -363,7 +377,7 @@ fn search(context: &Context<'_>, link: Option<usize>) -> Option<Candidate> {
     let settings = Settings { stays, ..settings }.into();
     let mut joints = all_joints(data);
     joints.truncate(link.map_or(joints.len(), |link| link + 1));
-    Some(Candidate { joints, settings, windows, searched: held.searched })
+    Some((Candidate { joints, settings, windows, searched: held.searched }, held.explained))
 }
 
 /// Whether a run of steps of `step` seconds can be a body that is held.

@@ -281,9 +281,9 @@ impl ArmChanges {
             arm.gravity = [x, y, z];
         }
         for name in &self.not_zero {
-            let parameter = Parameter::parse(name).filter(|p| p.link < arm.dof());
+            let parameter = Parameter::parse(name).filter(|p| p.link < arm.bodies());
             let Parameter { link, kind } = parameter.ok_or_else(|| Unchanged::NoParameter(name.clone()))?;
-            arm.joints[link].zero.retain(|zero| *zero != kind);
+            arm.declared_zero_mut(link).retain(|zero| *zero != kind);
             // A published grouping does not know the parameter.
             arm.groupings.clear();
         }

@@ -77,7 +77,7 @@ impl TorqueModel {
         // A body on any link, without the symmetries that the arm's own links are declared to have.
         let mut open = body.arm().clone();
         open.groupings.clear();
-        open.joints.iter_mut().for_each(|joint| joint.zero.clear());
+        (0..open.bodies()).for_each(|body| open.declared_zero_mut(body).clear());
         let model = dyngen::Model::derive(open)?;
         let mut all = vec![0.0; model.arm().all_parameters().len()];
         let link = payload.link.map_or(N - 1, JointNumber::index);

@@ -112,7 +112,7 @@ fn columns(arm: &Arm, recording: &Recording) -> Vec<f64> {
         recording.q.chunks_exact(n).zip(recording.v.chunks_exact(n)).zip(recording.a.chunks_exact(n));
     for ((q, v), a) in states {
         let all = newton_euler::regressor(arm, q, v, a, gravity);
-        all.chunks_exact(11 * n).for_each(|row| out.extend(kept.iter().map(|k| row[*k])));
+        all.chunks_exact(arm.all_parameters().len()).for_each(|row| out.extend(kept.iter().map(|k| row[*k])));
     }
     out
 }

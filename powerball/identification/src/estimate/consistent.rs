@@ -93,7 +93,7 @@ pub fn nearest(model: &Model, kind: SetKind, values: &[f64], metric: &Mat<f64>) 
         Problem { curvature: sums.transpose() * metric * &sums, sums, links: Vec::new(), rotors: Vec::new() };
     let mut x = vec![0.0; kept.len()];
     let mut without_body = Vec::new();
-    for link in 0..arm.dof() {
+    for link in 0..arm.bodies() {
         let mut parts: Vec<(usize, Matrix4<f64>)> = ParameterKind::ALL[..10]
             .iter()
             .enumerate()
@@ -141,7 +141,7 @@ pub fn nearest(model: &Model, kind: SetKind, values: &[f64], metric: &Mat<f64>) 
     }
     let set_values = times(&problem.sums, &x);
     let miss: Vec<f64> = set_values.iter().zip(values).map(|(a, b)| a - b).collect();
-    let mut all = vec![0.0; PER_LINK * arm.dof()];
+    let mut all = vec![0.0; arm.all_parameters().len()];
     for (p, value) in kept.iter().zip(&x) {
         all[p.index()] = *value;
     }

@@ -72,7 +72,7 @@ impl Masses {
             .and_then(|values| values.recognise(model))
             .map_err(|e| Error::Setting(e.to_string()))?;
         // Whatever the set, its carriers move like it.
-        let mut all = vec![0.0; PER_LINK * model.arm().dof()];
+        let mut all = vec![0.0; model.arm().all_parameters().len()];
         for (parameter, value) in model.set(kind)?.parameters.iter().zip(values) {
             for (carrier, coefficient) in &parameter.carriers {
                 all[carrier.index()] += model.sets().field.value(coefficient) * value;
@@ -128,7 +128,8 @@ fn bodies(arm: &Arm, shape: &Shape, limits: &[JointLimits]) -> Vec<f64> {
     let radius = shape.radius();
     let middle: Vec<f64> = limits.iter().map(|l| 0.5 * (l.position[0] + l.position[1])).collect();
     let frames = powerball_logs::chain::Chain::new(arm).poses(&middle);
-    let mut all = vec![0.0; PER_LINK * n];
+    // Bars are thin rods: without a model they weigh nothing.
+    let mut all = vec![0.0; arm.all_parameters().len()];
     let mut add = |link: usize, mass: f64, at: Vector3<f64>| {
         // A ball's own inertia, moved to the frame's origin.
         let own = 0.4 * mass * radius * radius;

@@ -250,8 +250,8 @@ impl Objective {
 
 /// k² where a column is a joint's rotor inertia, so that it counts at the joint; 1 else.
 fn reflected(arm: &Arm, parameter: &Parameter) -> f64 {
-    let ratio =
-        arm.joints[parameter.link].rotor_ratio.as_ref().filter(|_| parameter.kind == ParameterKind::Im);
+    let joint = arm.joints.get(parameter.link).filter(|_| parameter.kind == ParameterKind::Im);
+    let ratio = joint.and_then(|joint| joint.rotor_ratio.as_ref());
     ratio.map_or(1.0, |k| to_f64(k).powi(2))
 }
 

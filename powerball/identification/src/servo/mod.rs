@@ -19,7 +19,7 @@ mod uncertainty;
 
 use crate::identify::IdentifyError;
 use constants::{ALL, Constant, Found};
-use dyngen::arm::JointKind;
+use dyngen::arm::{JointKind, ParameterKind};
 use dyngen::{Arm, SetKind, Values};
 use fit::{Fitted, Free, errors, slopes};
 use powerball_controller::JointNumber;
@@ -89,10 +89,9 @@ fn tool(arm: &Arm) -> [f64; 3] {
 /// All parameters of 1 kg where the arm's last frame or its tool is.
 fn point_mass(arm: &Arm) -> Vec<f64> {
     let mut all = vec![0.0; arm.all_parameters().len()];
-    let per_link = all.len() / arm.links().max(1);
     let [x, y, z] = tool(arm);
     let own = [1.0, x, y, z, y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y];
-    let link = arm.tool_carrier() * per_link;
+    let link = arm.tool_carrier() * ParameterKind::ALL.len();
     all[link..link + own.len()].copy_from_slice(&own);
     all
 }

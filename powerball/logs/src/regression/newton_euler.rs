@@ -5,17 +5,19 @@ use dyngen::Arm;
 use dyngen::arm::{Convention, JointKind};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-/// The regressor of all eleven parameters a link (n × 11n, row-major) at one state, for gravity `g` in the
+/// The regressor of all eleven parameters of every link, then of every bar (n × p, row-major) at one state, for gravity `g` in the
 /// base frame.
 pub fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec<f64> {
     let n = arm.dof();
     let motors = arm.motor_velocity_matrix_f64();
     let rate = |motor: usize, of: &[f64]| -> f64 { motors[motor].iter().zip(of).map(|(m, x)| m * x).sum() };
     let number = dyngen::exact::rational::to_f64;
-    let mut y = vec![0.0; n * 11 * n];
+    let width = 11 * arm.bodies();
+    let mut y = vec![0.0; n * width];
     let (mut axes, mut points) = (Vec::new(), Vec::new());
     let (mut r, mut p) = (Matrix3::identity(), Vector3::zeros());
     let (mut w, mut dw, mut acc) = (Vector3::zeros(), Vector3::zeros(), -Vector3::from(g));
+    let mut frames = vec![Moving { r, p, w, dw, acc }];
     for (i, joint) in arm.joints.iter().enumerate() {
         let prismatic = joint.kind == JointKind::Prismatic;
         let (theta, d) = if prismatic {
@@ -43,13 +45,13 @@ pub fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec
             let (k, column) = (number(ratio), 11 * i + 10);
             let (velocity, change) = (rate(i, v), rate(i, a));
             for (j, factor) in motors[i].iter().enumerate() {
-                y[j * 11 * n + column] += factor * (k * k * change + k * axis.dot(&dw));
+                y[j * width + column] += factor * (k * k * change + k * axis.dot(&dw));
             }
             let moment = axis * (k * change) + w.cross(&axis) * (k * velocity);
             for j in 0..i {
                 if arm.joints[j].kind == JointKind::Revolute {
                     let z: Vector3<f64> = axes[j];
-                    y[j * 11 * n + column] += z.dot(&moment);
+                    y[j * width + column] += z.dot(&moment);
                 }
             }
         }
@@ -73,6 +75,7 @@ pub fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec
                 + w.cross(&w.cross(&from_axis));
         }
         (r, p) = (r_next, p_next);
+        frames.push(Moving { r, p, w, dw, acc });
 
         let local = r.transpose();
         let columns = link_columns(local * w, local * dw, local * acc);
@@ -80,14 +83,48 @@ pub fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec
             let z = local * axes[j];
             let lever = local * (p - points[j]);
             for (k, (force, moment)) in columns.iter().enumerate() {
-                y[j * 11 * n + 11 * i + k] = match arm.joints[j].kind {
+                y[j * width + 11 * i + k] = match arm.joints[j].kind {
                     JointKind::Revolute => z.dot(&(moment + lever.cross(force))),
                     JointKind::Prismatic => z.dot(force),
                 };
             }
         }
     }
+    for (k, bar) in arm.bars.iter().enumerate() {
+        let of =
+            |link: Option<usize>| (link.map_or(0, |link| link + 1), frames[link.map_or(0, |link| link + 1)]);
+        let ((carriers, carrier), (turning, parallel)) = (of(bar.carrier), of(bar.parallel));
+        let reach = carrier.r * Vector3::from(bar.pin.each_ref().map(number));
+        let acc = carrier.acc + carrier.dw.cross(&reach) + carrier.w.cross(&carrier.w.cross(&reach));
+        let local = parallel.r.transpose();
+        let columns = link_columns(local * parallel.w, local * parallel.dw, local * acc);
+        for j in 0..carriers.max(turning) {
+            let (z, lever) = (local * axes[j], local * (carrier.p + reach - points[j]));
+            for (c, (force, moment)) in columns.iter().enumerate() {
+                let (force, moment) = (felt_part(j < carriers, force), felt_part(j < turning, moment));
+                y[j * width + 11 * (n + k) + c] = match arm.joints[j].kind {
+                    JointKind::Revolute => z.dot(&(moment + lever.cross(&force))),
+                    JointKind::Prismatic => z.dot(&force),
+                };
+            }
+        }
+    }
     y
+}
+
+/// A link's frame in the base frame: axes, origin, angular velocity and acceleration, acceleration less gravity.
+#[derive(Clone, Copy)]
+struct Moving {
+    r: Matrix3<f64>,
+    p: Vector3<f64>,
+    w: Vector3<f64>,
+    dw: Vector3<f64>,
+    acc: Vector3<f64>,
+}
+
+/// A joint feels the force of a bar where it moves the pin, and its moment where it turns the bar.
+fn felt_part(felt: bool, v: &Vector3<f64>) -> Vector3<f64> {
+    if felt { *v } else { Vector3::zeros() }
 }
 
 /// Force on a link and moment about the origin of its frame for unit mass, first moments and inertias, from its angular

@@ -181,7 +181,7 @@ impl<'a> Data<'a> {
                 left_out: left_out.clone(),
                 per_joint: false,
                 top_velocity: top_velocity.clone(),
-                links: vec![OnceLock::new(); n],
+                links: vec![OnceLock::new(); body.arm().bodies()],
                 force: OnceLock::new(),
                 declared_zero: OnceLock::new(),
                 pull: Default::default(),
@@ -251,7 +251,7 @@ impl<'a> Data<'a> {
             notes: self.notes.clone(),
             per_joint: false,
             top_velocity: self.top_velocity.clone(),
-            links: vec![OnceLock::new(); self.dof()],
+            links: vec![OnceLock::new(); self.body.arm().bodies()],
             force: OnceLock::new(),
             declared_zero: OnceLock::new(),
             pull: Default::default(),
@@ -329,7 +329,7 @@ impl<'a> Data<'a> {
         blocks_of(&self.recordings, &self.joints, &self.band, length)
     }
 
-    /// The ten inertial parameters of a link as columns over all joints; empty where they cannot be had.
+    /// The ten inertial parameters of a link, or of a bar after them, as columns over all joints; empty where they cannot be had.
     pub fn link_columns(&self, link: usize) -> &[Column] {
         self.links[link].get_or_init(|| {
             let first = link * ParameterKind::ALL.len();
@@ -349,12 +349,12 @@ impl<'a> Data<'a> {
     }
 
     /// The static torque of every link's mass and first moments, [`PULLED`] a link, under unit gravity along a
-    /// base axis; empty where they cannot be had. A column has no part on a joint that does not feel it.
+    /// base axis, then of every bar's; empty where they cannot be had. A column has no part on a joint that does not feel it.
     pub fn pull_columns(&self, axis: usize) -> &[Column] {
         self.pull[axis].get_or_init(|| {
             let mut columns = Vec::new();
             // Link by link: of a long log all of them at full rate would be large.
-            for link in 0..self.dof() {
+            for link in 0..self.body.arm().bodies() {
                 let first = link * ParameterKind::ALL.len();
                 let chosen: Vec<usize> = (first..first + PULLED).collect();
                 let of_link =

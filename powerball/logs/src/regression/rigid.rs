@@ -45,9 +45,7 @@ impl Wide {
     fn new(arm: &Arm, gravity: Option<[i64; 3]>) -> Result<Wide, Error> {
         let mut arm = arm.clone();
         arm.groupings.clear();
-        for joint in &mut arm.joints {
-            joint.zero.clear();
-        }
+        (0..arm.bodies()).for_each(|body| arm.declared_zero_mut(body).clear());
         if let Some(g) = gravity {
             arm.gravity = g.map(rational::integer);
         }
@@ -203,7 +201,7 @@ impl RigidArm {
     /// Values of all eleven parameters a link that move like the minimal set's `values`.
     #[must_use]
     pub fn carried(&self, values: &[f64]) -> Vec<f64> {
-        let mut all = vec![0.0; 11 * self.dof()];
+        let mut all = vec![0.0; self.arm().all_parameters().len()];
         if let Ok(set) = self.model.set(SetKind::Minimal) {
             for (parameter, value) in set.parameters.iter().zip(values) {
                 for (carrier, coefficient) in &parameter.carriers {
@@ -335,7 +333,7 @@ pub(super) fn gravity_unobservable(body: &RigidArm) -> Option<Vec<Vec<f64>>> {
     let (felt, _) = split(&(&pulled * &unseen), pulled.norm_l2())?;
     let directions = unseen * felt;
     let whole = |d: usize| {
-        let mut all = vec![0.0; 11 * body.dof()];
+        let mut all = vec![0.0; arm.all_parameters().len()];
         kept.iter().enumerate().for_each(|(row, k)| all[*k] = directions[(row, d)]);
         all
     };
@@ -444,6 +442,61 @@ mod tests {
                     approx::assert_relative_eq!(columns[index], full[j * 11 * n + c], epsilon = 1e-9);
                     approx::assert_relative_eq!(sideways[index], still[j * 11 * n + c], epsilon = 1e-9);
                 }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod bar_tests {
+    use super::*;
+    use crate::regression::newton_euler;
+    use rand::{RngExt, SeedableRng};
+
+    /// A loop on the base and one around an axis behind a sliding joint.
+    const ARM: &str = r#"
+name = "loops"
+convention = "standard"
+gravity = [1, 2, -9]
+joint = [
+    { kind = "revolute", a = 0.1, alpha = "-pi/2", d = 0.2, theta = 0.3, rotor_ratio = 50 },
+    { kind = "prismatic", a = 0.2, alpha = "pi/2", d = 0.1, theta = 0 },
+    { kind = "revolute", a = 0.3, b = 0.05, alpha = 0.4, d = 0.1, theta = 0, rotor_ratio = 50, zero = ["mz"] },
+]
+[[loop]]
+joints = [1, "a", "b", "c"]
+lengths = [0.2, 0.5, 0.2, 0.5]
+inner = 1
+outer = 2
+[[loop]]
+joints = [3, "d", "e", "f"]
+lengths = [0.15, 0.4, 0.15, 0.4]
+inner = "pi/2"
+outer = -0.7
+bar = [{ zero = ["mz", "Ixz"] }]
+"#;
+
+    #[test]
+    fn columns_of_bars_agree_with_newton_euler() {
+        let arm = Arm::parse(ARM, "arm.toml").unwrap();
+        let body = RigidArm::new(&arm).unwrap();
+        let (n, all) = (arm.dof(), arm.all_parameters().len());
+        let mut rng = chacha20::ChaCha8Rng::seed_from_u64(4);
+        let mut draw = |count: usize| (0..count).map(|_| rng.random_range(-1.5..1.5)).collect::<Vec<f64>>();
+        let chosen: Vec<usize> = (0..all).filter(|k| k % 11 < 10).collect();
+        for _ in 0..3 {
+            let (q, v, a) = (draw(n), draw(n), draw(n));
+            let expected = newton_euler::regressor(&arm, &q, &v, &a, [1.0, 2.0, -9.0]);
+            let columns = body.parameter_columns(&chosen, &q, &v, &a).unwrap();
+            let values = draw(body.names().len());
+            let (carried, torque) = (body.carried(&values), body.torque(&q, &v, &a, &values));
+            for j in 0..n {
+                for (k, c) in chosen.iter().enumerate() {
+                    let index = j * chosen.len() + k;
+                    approx::assert_relative_eq!(columns[index], expected[j * all + c], epsilon = 1e-9);
+                }
+                let sum: f64 = (0..all).map(|k| expected[j * all + k] * carried[k]).sum();
+                approx::assert_relative_eq!(torque[j], sum, epsilon = 1e-9, max_relative = 1e-9);
             }
         }
     }

@@ -1,6 +1,7 @@
 mod laws;
 #[path = "../../../../../tests/support/measured.rs"]
 mod logs_of_arms;
+mod loops;
 mod measured;
 mod model;
 mod names;

@@ -1,0 +1,59 @@
+//! Bodies of closed loops that are no links of the chain: the bars of a parallelogram.
+
+use super::{Arm, ParameterKind};
+use crate::exact::rational::Rational;
+
+/// A bar of a parallelogram. One of its pins is a point of a link, and it turns with another link: its frame
+/// has the axes of that one's frame, and its origin at the pin.
+///
+/// So its pose is known without a coordinate of its own, and no force between the bars does any work: its
+/// weight and inertia act at the pin and on the link that it turns with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bar {
+    /// The bar's name.
+    pub name: String,
+    /// The link that carries its pin, from 0; `None` is the base.
+    pub carrier: Option<usize>,
+    /// The pin in that link's frame, m.
+    pub pin: [Rational; 3],
+    /// The link that it turns with, from 0; `None` is the base.
+    pub parallel: Option<usize>,
+    /// Inertial parameters that are declared zero.
+    pub zero: Vec<ParameterKind>,
+}
+
+impl Arm {
+    /// The number of bodies: the links of the chain, then the bars.
+    pub fn bodies(&self) -> usize {
+        self.links() + self.bars.len()
+    }
+
+    /// The bar of a body, from 0 in the order of the parameters; `None` for a link of the chain.
+    pub fn bar(&self, body: usize) -> Option<&Bar> {
+        self.bars.get(body.checked_sub(self.links())?)
+    }
+
+    /// The parameters of a body that are declared zero.
+    ///
+    /// # Panics
+    /// If the arm has no such body.
+    pub fn declared_zero_mut(&mut self, body: usize) -> &mut Vec<ParameterKind> {
+        let links = self.links();
+        match body.checked_sub(links) {
+            None => &mut self.joints[body].zero,
+            Some(bar) => &mut self.bars[bar].zero,
+        }
+    }
+
+    /// For whoever takes an arm to be a chain alone.
+    ///
+    /// # Errors
+    /// Which bars it has.
+    pub fn without_bars(&self, who: &str) -> Result<(), String> {
+        if self.bars.is_empty() {
+            return Ok(());
+        }
+        let names: Vec<String> = self.bars.iter().map(|bar| format!("'{}'", bar.name)).collect();
+        Err(format!("{who} knows no bars of closed loops: the arm file's [[loop]] has {}", names.join(", ")))
+    }
+}

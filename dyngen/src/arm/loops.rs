@@ -1,0 +1,368 @@
+//! `[[loop]]`: planar loops of four bars, which close on the chain. Those that are parallelograms are known:
+//! their joints of the chain are affine functions of each other, and their other bars are [`Bar`]s.
+
+use super::table::{Reader, Table, Value, describe};
+use super::{Angle, Bar, Convention, Joint, JointKind, Mimic, ParameterKind};
+use crate::exact::rational::{self, Rational, to_f64};
+use num_traits::{Signed, Zero};
+use std::f64::consts::TAU;
+use toml::de::DeValue;
+
+const KEYS: [&str; 5] = ["joints", "lengths", "inner", "outer", "bar"];
+const BAR_KEYS: [&str; 2] = ["name", "zero"];
+/// The bars of a loop.
+const BARS: usize = 4;
+/// The most loops that an arm may have.
+const MAX_LOOPS: usize = 8;
+/// Lengths and angles that differ by less are the same, m or rad.
+const SAME: f64 = 1e-9;
+
+/// A loop as the file says it.
+struct Loop {
+    /// Its joints of the chain: one, or two neighbours.
+    first: usize,
+    last: usize,
+    /// The names of its other joints, from the outer link on.
+    pins: Vec<String>,
+    /// Distance of each joint to the next.
+    lengths: [Rational; BARS],
+    /// Direction from the first joint to the last pin, on the link before it.
+    inner: Angle,
+    /// Direction from the last joint of the chain to the first pin, on the link behind it.
+    outer: Angle,
+}
+
+/// Reads the loops of an arm and lets the joints that they tie follow each other.
+pub(super) fn read(
+    reader: &mut Reader<'_>,
+    tables: &[Table<'_, '_>],
+    convention: Convention,
+    joints: &mut [Joint],
+) -> Option<Vec<Bar>> {
+    if let Some(t) = tables.get(MAX_LOOPS) {
+        reader
+            .errors
+            .error(t.span.clone(), format!("{}: an arm may have at most {MAX_LOOPS} loops", t.place));
+        return None;
+    }
+    let mut bars = Vec::new();
+    let mut sound = true;
+    for t in tables {
+        reader.unknown_keys(t, &KEYS);
+        let found = read_one(reader, t, convention, joints).and_then(|found| {
+            tie(joints, convention, &found)
+                .map_err(|why| reader.errors.error(t.span.clone(), format!("{}: {why}", t.place)))
+                .ok()?;
+            let own = found.bars(convention, joints);
+            described(reader, t, own)
+        });
+        match found {
+            Some(own) => bars.extend(own),
+            None => sound = false,
+        }
+    }
+    sound.then_some(bars)
+}
+
+fn read_one(
+    reader: &mut Reader<'_>,
+    t: &Table<'_, '_>,
+    convention: Convention,
+    joints: &[Joint],
+) -> Option<Loop> {
+    let place = &t.place;
+    let named = reader.required(t, "joints").and_then(|v| names(reader, v, place, joints));
+    let lengths = reader.required(t, "lengths").and_then(|v| lengths(reader, v, place));
+    let mut direction =
+        |key: &str| reader.required(t, key).and_then(|v| reader.angle(v, &format!("{place}: {key}")));
+    let (inner, outer) = (direction("inner"), direction("outer"));
+    let (first, last, pins) = named?;
+    let found = Loop { first, last, pins, lengths: lengths?, inner: inner?, outer: outer? };
+    let wrong = planar(joints, convention, &found).or_else(|| found.unequal(convention, joints));
+    if let Some(why) = wrong {
+        reader.errors.error(t.span.clone(), format!("{place}: {why}"));
+        return None;
+    }
+    Some(found)
+}
+
+/// The four joints of a loop: the first and the last of the chain, and the names of the others.
+fn names(
+    reader: &mut Reader<'_>,
+    v: &Value<'_>,
+    place: &str,
+    joints: &[Joint],
+) -> Option<(usize, usize, Vec<String>)> {
+    let items: Vec<&Value<'_>> = v.get_ref().as_array().map(|a| a.iter().collect()).unwrap_or_default();
+    let mut fail = |span, message: String| {
+        reader.errors.error(span, format!("{place}: joints {message}"));
+        None
+    };
+    if items.len() != BARS {
+        let message = "must be the four joints around the loop: first one or two of the chain, by name or \
+                       number, then names for its other pins";
+        return fail(v.span(), format!("{message}, found {}", describe(v)));
+    }
+    let (mut of_chain, mut pins): (Vec<usize>, Vec<String>) = (Vec::new(), Vec::new());
+    for item in items {
+        let number = match item.get_ref() {
+            DeValue::Integer(i) if i.radix() == 10 => i.as_str().parse::<usize>().ok(),
+            _ => None,
+        };
+        let text = item.get_ref().as_str().map(str::trim).filter(|text| !text.is_empty());
+        let by_name = text.and_then(|text| joints.iter().position(|j| j.name.as_deref() == Some(text)));
+        let joint = number.filter(|n| (1..=joints.len()).contains(n)).map(|n| n - 1).or(by_name);
+        match (joint, text) {
+            (Some(_), _) if !pins.is_empty() => {
+                return fail(item.span(), "must begin with those of the chain: pins follow".to_string());
+            }
+            (Some(joint), _) => of_chain.push(joint),
+            (None, Some(text)) if !pins.iter().any(|pin| pin == text) => pins.push(text.to_string()),
+            (None, Some(text)) => return fail(item.span(), format!("names the pin '{text}' twice")),
+            (None, None) => {
+                let message = format!(
+                    "names {}, which is no joint of this arm: they are 1 to {}",
+                    describe(item),
+                    joints.len()
+                );
+                return fail(item.span(), message);
+            }
+        }
+    }
+    match of_chain[..] {
+        [first] => Some((first, first, pins)),
+        [first, last] if last == first + 1 => Some((first, last, pins)),
+        [] => fail(v.span(), "has no joint of the chain: name one or two of them first".to_string()),
+        [_, _] => fail(v.span(), "of the chain must be neighbours, from the base outwards".to_string()),
+        _ => fail(
+            v.span(),
+            "has more than two of the chain: where the chain itself runs round the loop, give its joints mimic"
+                .to_string(),
+        ),
+    }
+}
+
+fn lengths(reader: &mut Reader<'_>, v: &Value<'_>, place: &str) -> Option<[Rational; BARS]> {
+    let items: Vec<&Value<'_>> = v.get_ref().as_array().map(|a| a.iter().collect()).unwrap_or_default();
+    let what = "must be four lengths in m, from each joint to the next and from the last to the first";
+    let read: Vec<Option<Rational>> =
+        items.iter().map(|item| reader.number(item, &format!("{place}: lengths"), "m")).collect();
+    let read: Vec<Rational> = read.into_iter().collect::<Option<_>>()?;
+    let Ok(lengths) = <[Rational; BARS]>::try_from(read) else {
+        reader.errors.error(v.span(), format!("{place}: lengths {what}, found {}", describe(v)));
+        return None;
+    };
+    let mut sound = true;
+    let total = lengths.iter().fold(Rational::zero(), |sum, x| sum + x);
+    for (length, item) in lengths.iter().zip(&items) {
+        let message = if !length.is_positive() {
+            "must be greater than zero".to_string()
+        } else if length + length >= total {
+            format!("do not close: {} m is as long as the other three together, or longer", to_f64(length))
+        } else {
+            continue;
+        };
+        sound = false;
+        reader.errors.error(item.span(), format!("{place}: lengths {message}"));
+    }
+    sound.then_some(lengths)
+}
+
+/// Why the joints of a loop do not turn in one plane.
+fn planar(joints: &[Joint], convention: Convention, found: &Loop) -> Option<String> {
+    let of_loop = &joints[found.first..=found.last];
+    if let Some(k) = of_loop.iter().position(|joint| joint.kind != JointKind::Revolute) {
+        return Some(format!("joint {} slides: every joint of a loop turns", found.first + k + 1));
+    }
+    (found.first != found.last && found.sign(convention, joints).is_none()).then(|| {
+        let (first, last) = (found.first + 1, found.last + 1);
+        format!(
+            "is not planar: the axes of joints {first} and {last} are not parallel (alpha between them is not 0 \
+             or pi)"
+        )
+    })
+}
+
+/// Lets one of a loop's two joints of the chain follow the other: the outer one, or the one that the file says.
+fn tie(joints: &mut [Joint], convention: Convention, found: &Loop) -> Result<(), String> {
+    let (a, b) = (found.first, found.last);
+    let Some(sign) = found.sign(convention, joints).filter(|_| a != b) else { return Ok(()) };
+    // In the plane: theta_a + q_a + sign·(theta_b + q_b + outer) = inner.
+    let (one, minus) = (rational::integer(sign), rational::integer(-sign));
+    let terms = [
+        (found.inner.clone(), one.clone()),
+        (joints[a].theta.clone(), minus.clone()),
+        (joints[b].theta.clone(), rational::integer(-1)),
+        (found.outer.clone(), rational::integer(-1)),
+    ];
+    let offset = wrapped(&Angle::sum(&terms));
+    let outer = Mimic { joint: a, ratio: minus.clone(), offset: offset.clone() };
+    let inner = Mimic { joint: b, ratio: minus, offset: one * offset };
+    let (follower, right) = if joints[a].mimic.is_some() { (a, inner) } else { (b, outer) };
+    let Some(said) = &joints[follower].mimic else {
+        joints[follower].mimic = Some(right);
+        return Ok(());
+    };
+    let apart = to_f64(&(&said.offset - &right.offset)) / TAU;
+    let same = said.joint == right.joint && said.ratio == right.ratio && (apart - apart.round()).abs() < SAME;
+    if same && joints[a + b - follower].mimic.is_none() {
+        return Ok(());
+    }
+    Err(format!(
+        "its parallelogram makes joint {} follow joint {}: ratio = {}, offset = {}; mimic says otherwise (it may be \
+         left out)",
+        follower + 1,
+        right.joint + 1,
+        right.ratio,
+        to_f64(&right.offset)
+    ))
+}
+
+/// An angle between −pi and pi as a number of radians; zero where it is a whole number of turns.
+fn wrapped(angle: &Angle) -> Rational {
+    let radians = angle.radians();
+    let rest = radians - TAU * (radians / TAU).round();
+    if rest.abs() < SAME { Rational::zero() } else { decimal(rest) }
+}
+
+/// A number to 15 decimals.
+fn decimal(x: f64) -> Rational {
+    rational::parse_rational(&format!("{x:.15}")).unwrap_or_default()
+}
+
+/// A vector of the plane, turned by an angle.
+fn turned(angle: &Angle, [x, y]: [Rational; 2]) -> [Rational; 2] {
+    match angle.quarter_turns() {
+        Some(0) => [x, y],
+        Some(1) => [-y, x],
+        Some(2) => [-x, -y],
+        Some(_) => [y, -x],
+        None => {
+            let ((sin, cos), [x, y]) = (angle.sin_cos(), [to_f64(&x), to_f64(&y)]);
+            [decimal(cos * x - sin * y), decimal(sin * x + cos * y)]
+        }
+    }
+}
+
+impl Loop {
+    /// Whether the axes of its two joints of the chain point the same way, 1, or opposite ways, -1.
+    fn sign(&self, convention: Convention, joints: &[Joint]) -> Option<i64> {
+        let twist = match convention {
+            Convention::Modified => &joints[self.last].alpha,
+            Convention::Standard => &joints[self.first].alpha,
+        };
+        match twist.quarter_turns() {
+            Some(0) => Some(1),
+            Some(2) => Some(-1),
+            _ => None,
+        }
+    }
+
+    /// Why its lengths are those of no parallelogram, or not those of the table.
+    fn unequal(&self, convention: Convention, joints: &[Joint]) -> Option<String> {
+        let [first, second, third, fourth] = &self.lengths;
+        if first != third || second != fourth {
+            return Some(format!(
+                "lengths {}, {}, {}, {} are no parallelogram: only loops whose opposite bars are equal are supported \
+                 (the first and third, the second and fourth length)",
+                to_f64(first),
+                to_f64(second),
+                to_f64(third),
+                to_f64(fourth)
+            ));
+        }
+        let row = match convention {
+            Convention::Modified => &joints[self.last],
+            Convention::Standard => &joints[self.first],
+        };
+        let between = to_f64(&row.a).hypot(to_f64(&row.b));
+        (self.first != self.last && (to_f64(first) - between).abs() > SAME).then(|| {
+            format!(
+                "its first length is {} m: joints {} and {} are {between} m apart in the table (a and b)",
+                to_f64(first),
+                self.first + 1,
+                self.last + 1
+            )
+        })
+    }
+
+    /// Its bars that are no links, from the outer link on.
+    fn bars(&self, convention: Convention, joints: &[Joint]) -> Vec<Bar> {
+        let inner_link = self.first.checked_sub(1);
+        let name = |from: usize| {
+            let at = |k: usize| self.pins.get(k).cloned().unwrap_or_default();
+            format!("{}-{}", at(from), at(from + 1))
+        };
+        let bar =
+            |name: String, carrier, pin, parallel| Bar { name, carrier, pin, parallel, zero: Vec::new() };
+        let outer = self.outer_pin(convention, &joints[self.last]);
+        // Its outer pin is on the outer link, and it is parallel to the bar opposite.
+        if self.first != self.last {
+            return vec![bar(name(0), Some(self.last), outer, Some(self.first))];
+        }
+        let inner = self.inner_pin(convention, &joints[self.first]);
+        vec![
+            bar(name(0), Some(self.last), outer, inner_link),
+            bar(name(1), inner_link, inner, Some(self.first)),
+        ]
+    }
+
+    /// The first pin in the outer link's frame.
+    fn outer_pin(&self, convention: Convention, joint: &Joint) -> [Rational; 3] {
+        // On the outer link: the bar opposite to the third length's, or to the fourth's.
+        let length = self.lengths[self.last - self.first].clone();
+        let [x, y] = turned(&self.outer, [length, Rational::zero()]);
+        match convention {
+            Convention::Modified => [x, y, Rational::zero()],
+            Convention::Standard => {
+                let back = Angle::sum(&[(joint.alpha.clone(), rational::integer(-1))]);
+                let [y, z] = turned(&back, [y - &joint.b, Rational::zero()]);
+                [x - &joint.a, y, z]
+            }
+        }
+    }
+
+    /// The last pin in the inner link's frame.
+    fn inner_pin(&self, convention: Convention, joint: &Joint) -> [Rational; 3] {
+        // In the plane in which the first joint's frame is.
+        let [x, y] = turned(&self.inner, [self.lengths[BARS - 1].clone(), Rational::zero()]);
+        match convention {
+            Convention::Standard => [x, y, joint.d.clone()],
+            Convention::Modified => {
+                let [y, z] = turned(&joint.alpha, [y, joint.d.clone()]);
+                [x + &joint.a, y + &joint.b, z]
+            }
+        }
+    }
+}
+
+/// The bars with the names and the symmetries that the file gives them.
+fn described(reader: &mut Reader<'_>, t: &Table<'_, '_>, mut bars: Vec<Bar>) -> Option<Vec<Bar>> {
+    let tables = reader.tables(t, "bar");
+    if tables.len() > bars.len() {
+        let (span, count) = (tables[bars.len()].span.clone(), bars.len());
+        let message = format!(
+            "{}: {} tables [[loop.bar]]: its bars that are no links of the chain are {count}, from the outer link on",
+            t.place,
+            tables.len()
+        );
+        reader.errors.error(span, message);
+        return None;
+    }
+    let mut sound = true;
+    for (bar, table) in bars.iter_mut().zip(&tables) {
+        reader.unknown_keys(table, &BAR_KEYS);
+        let place = format!("{}: {}", t.place, table.place);
+        let name = reader.optional(table, "name", |r, v| r.text(v, &format!("{place}: name")));
+        let zero: Option<Vec<ParameterKind>> = match table.table.get("zero") {
+            Some(v) => reader.symmetries(v, &place),
+            None => Some(Vec::new()),
+        };
+        sound &= name.is_some() && zero.is_some();
+        if let Some(Some(name)) = name {
+            bar.name = name;
+        }
+        bar.zero = zero.unwrap_or_default();
+    }
+    sound.then_some(bars)
+}

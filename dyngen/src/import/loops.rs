@@ -1,0 +1,191 @@
+//! Loops that a MuJoCo model closes by `<connect>`: parallelograms on the chain become `[[loop]]`, with the
+//! bodies of their bars.
+
+use super::chain::{ChainJoint, Mass, held, masses};
+use super::pose::Pose;
+use super::tree::Tree;
+use super::urdf::{Connect, Mimic};
+use nalgebra::Vector3;
+
+/// Points and directions nearer than this are the same, m or as a sine.
+const SAME: f64 = 1e-6;
+/// The joints of a loop.
+const CORNERS: usize = 4;
+
+/// A parallelogram on the chain, at q = 0 in the root link's frame.
+pub(crate) struct ChainLoop {
+    /// Its first and last joint of the chain.
+    pub(crate) first: usize,
+    pub(crate) last: usize,
+    /// The names of its other pins, from the link behind it on.
+    pub(crate) pins: Vec<String>,
+    /// From each joint to the next, m.
+    pub(crate) lengths: [f64; CORNERS],
+    /// From the last joint of the chain to the first pin, and from the first joint to the last pin.
+    pub(crate) outer: Vector3<f64>,
+    pub(crate) inner: Vector3<f64>,
+    /// Its bars that are no links of the chain, in the order of the pins between them.
+    pub(crate) bars: Vec<ChainBar>,
+}
+
+/// A bar of a loop.
+pub(crate) struct ChainBar {
+    pub(crate) name: String,
+    pub(crate) masses: Vec<Mass>,
+}
+
+/// A loop's joint: what it joins, by the joints that move them, and where it is.
+struct Pin {
+    name: String,
+    between: [Option<usize>; 2],
+    point: Vector3<f64>,
+    /// None for a `<connect>`, which holds in every direction.
+    direction: Option<Vector3<f64>>,
+}
+
+/// The loop that an equality closes, or why it is none that an arm file has.
+pub(super) fn close(
+    tree: &Tree<'_>,
+    tolerance: f64,
+    path: &[usize],
+    joints: &mut [ChainJoint],
+    connect: &Connect,
+) -> Result<(ChainLoop, Vec<String>), String> {
+    let seen = Seen { tree, tolerance };
+    let ends = connect.links.each_ref().map(|name| tree.link(name).and_then(|link| seen.moving(link)));
+    let [Some(one), Some(other)] = &ends else {
+        return Err("its bodies are not behind the base".to_string());
+    };
+    let common = one.iter().zip(other).take_while(|(a, b)| a == b).count();
+    let tied: Vec<usize> = one[common..].iter().chain(&other[common..]).copied().collect();
+    let (of_chain, of_bars): (Vec<usize>, Vec<usize>) = tied.iter().partition(|j| path.contains(j));
+    let place = |joint: &usize| joints.iter().position(|j| j.name == tree.robot.joints[*joint].name);
+    let mut places: Vec<usize> = of_chain.iter().filter_map(place).collect();
+    places.sort_unstable();
+    let (first, last) = match places[..] {
+        [first] => (first, first),
+        [first, last] if last == first + 1 => (first, last),
+        _ => return Err("it closes no loop of one or two neighbouring joints of the chain".to_string()),
+    };
+    if tied.len() != CORNERS - 1 || tied.iter().any(|j| !seen.turns(*j)) {
+        return Err("it closes no loop of four bars on hinges".to_string());
+    }
+    let anchor = seen.pose(tree.link(&connect.links[0]).unwrap_or(tree.root)).point(connect.anchor.into());
+    let mut open: Vec<Pin> = of_bars.iter().map(|j| seen.pin(*j)).collect();
+    open.push(Pin {
+        name: format!("connect in line {}", connect.line),
+        between: [one.last().copied(), other.last().copied()],
+        point: anchor,
+        direction: None,
+    });
+    let chain = |k: usize| path.iter().copied().filter(|j| tree.moves(*j)).nth(k);
+    let (mut at, inner) = (chain(last), first.checked_sub(1).and_then(chain));
+    let (mut pins, mut bars): (Vec<Pin>, Vec<Option<usize>>) = (Vec::new(), Vec::new());
+    while let Some(k) = open.iter().position(|pin| pin.between.contains(&at)) {
+        let pin = open.swap_remove(k);
+        at = if pin.between[0] == at { pin.between[1] } else { pin.between[0] };
+        pins.push(pin);
+        bars.push(at);
+    }
+    if !open.is_empty() || at != inner {
+        return Err("its bars do not lead from the link behind the loop to the one before it".to_string());
+    }
+    bars.pop();
+    let (first_joint, last_joint) = (&joints[first], &joints[last]);
+    let normal = first_joint.direction;
+    let flat = |v: Vector3<f64>| v - normal * normal.dot(&v);
+    let directions = pins.iter().filter_map(|pin| pin.direction).chain([last_joint.direction]);
+    if directions.into_iter().any(|d| d.cross(&normal).norm() > SAME) {
+        return Err("it is not planar: its hinges are not parallel".to_string());
+    }
+    let own = if first == last { vec![first_joint.point] } else { vec![first_joint.point, last_joint.point] };
+    let corners: Vec<Vector3<f64>> = own.into_iter().chain(pins.iter().map(|pin| pin.point)).collect();
+    let side = |k: usize| flat(corners[(k + 1) % CORNERS] - corners[k]);
+    if (side(0) + side(2)).norm() > SAME {
+        return Err("only loops whose opposite bars are equal and parallel are supported".to_string());
+    }
+    let lengths = std::array::from_fn(|k| side(k % 2).norm());
+    if lengths.iter().any(|length| *length < SAME) {
+        return Err("two of its hinges are at one place".to_string());
+    }
+    let bar = |node: &Option<usize>| ChainBar { name: seen.name(*node), masses: seen.masses(*node) };
+    let mut notes = Vec::new();
+    for joint in of_bars.iter().map(|j| &tree.robot.joints[*j]) {
+        if joint.motor.is_some_and(|motor| motor.armature != 0.0) {
+            notes.push(format!("joint '{}' moves a bar: its armature is left out", joint.name));
+        }
+    }
+    let found = ChainLoop {
+        first,
+        last,
+        lengths,
+        outer: side(last - first),
+        inner: -side(CORNERS - 1),
+        bars: bars.iter().map(bar).collect(),
+        pins: pins.into_iter().map(|pin| pin.name).collect(),
+    };
+    if first != last {
+        let ratio = if first_joint.direction.dot(&last_joint.direction) > 0.0 { -1.0 } else { 1.0 };
+        let mimic = Mimic { joint: first_joint.name.clone(), ratio, offset: 0.0 };
+        joints[last].follows.get_or_insert((first, mimic));
+    }
+    Ok((found, notes))
+}
+
+/// The tree at q = 0.
+struct Seen<'t, 'r> {
+    tree: &'t Tree<'r>,
+    tolerance: f64,
+}
+
+impl Seen<'_, '_> {
+    /// The joints from the root to a link that move.
+    fn moving(&self, link: usize) -> Option<Vec<usize>> {
+        Some(self.tree.path(link)?.into_iter().filter(|j| self.tree.moves(*j)).collect())
+    }
+
+    fn turns(&self, joint: usize) -> bool {
+        matches!(self.tree.robot.joints[joint].kind.as_str(), "revolute" | "continuous")
+    }
+
+    /// The pose of a link.
+    fn pose(&self, link: usize) -> Pose {
+        let path = self.tree.path(link).unwrap_or_default();
+        path.into_iter().fold(Pose::identity(), |pose, joint| {
+            let of = &self.tree.robot.joints[joint];
+            let pose = pose.then(&Pose::of(&of.origin, self.tolerance));
+            self.tree.locked.get(&joint).map_or(pose, |value| pose.then(&held(of, *value)))
+        })
+    }
+
+    /// A hinge.
+    fn pin(&self, joint: usize) -> Pin {
+        let of = &self.tree.robot.joints[joint];
+        let parent = self.tree.link(&of.parent).and_then(|link| self.moving(link));
+        let pose = self.pose(self.tree.child(joint));
+        Pin {
+            name: of.name.clone(),
+            between: [parent.and_then(|moving| moving.last().copied()), Some(joint)],
+            point: pose.origin,
+            direction: Some(pose.rotation * Vector3::from(of.axis).normalize()),
+        }
+    }
+
+    /// The links that move with a joint as one.
+    fn rigid(&self, joint: Option<usize>) -> impl Iterator<Item = usize> {
+        let moves =
+            move |link: &usize| self.moving(*link).is_some_and(|moving| moving.last().copied() == joint);
+        (0..self.tree.robot.links.len()).filter(moves)
+    }
+
+    fn masses(&self, joint: Option<usize>) -> Vec<Mass> {
+        let of = |link: usize| masses(&self.tree.robot.links[link], &self.pose(link), self.tolerance);
+        self.rigid(joint).filter_map(of).collect()
+    }
+
+    fn name(&self, joint: Option<usize>) -> String {
+        let links = &self.tree.robot.links;
+        let heavy = self.rigid(joint).find(|link| links[*link].mass != 0.0);
+        heavy.or_else(|| self.rigid(joint).last()).map_or(String::new(), |link| links[link].name.clone())
+    }
+}

@@ -1,0 +1,114 @@
+//! Loops that a MuJoCo model closes by `<connect>`: against MuJoCo's own numbers.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use dyngen::import::{self, Imported, Options};
+use dyngen::{Evaluator, Function, Model, SetKind};
+
+const CRANK: &str = include_str!("mjcf/crank.xml");
+const LEVEL: &str = include_str!("mjcf/level.xml");
+
+/// From MuJoCo 4.0.0: q, q̇ and q̈ of the joints that move on their own, and their torques. The others' motion is solved from
+/// the equality's Jacobian and its rate; the torques are Gᵀ times those of mj_inverse for the tree without the equality,
+/// where G maps velocities.
+type Known<const N: usize> = [[f64; N]; 4];
+const OF_CRANK: [Known<5>; 2] = [
+    [
+        [0.37, 0.37, 0.02, -0.26, -0.54],
+        [-0.35, -0.27, -1.36, -1.35, 1.5],
+        [0.91, -1.59, -0.39, 2.85, 2.39],
+        [
+            33.34650562364084,
+            -293.4352588271227,
+            -125.91942306375678,
+            -4.6239716449767485,
+            -0.24952508953308986,
+        ],
+    ],
+    [
+        [0.41, -0.13, -0.01, 0.21, -0.53],
+        [0.17, -0.69, 1.14, -1.31, 0.54],
+        [2.22, -1.64, 2.37, 2.23, -2.89],
+        [36.93213293457622, -97.8580857617091, -81.0046191115949, -3.3737401596796652, -0.1947039447715169],
+    ],
+];
+const OF_LEVEL: [Known<3>; 2] = [
+    [
+        [0.37, 0.37, 0.02],
+        [-0.64, -1.34, -0.35],
+        [-0.55, -2.73, -2.71],
+        [8.096070947333224, -73.31706838854504, -0.11473743705239571],
+    ],
+    [
+        [0.6, 0.18, -0.32],
+        [-0.2, 1.42, 1.19],
+        [2.07, -0.65, -0.04],
+        [9.689173137915002, -30.73928813377319, -0.06946558848968967],
+    ],
+];
+
+fn imported(text: &str, tip: &str) -> Imported {
+    let options = Options { tip: Some(tip.to_string()), ..Options::default() };
+    import::any(text, "arm.xml", &options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn compare<const N: usize>(text: &str, known: &[Known<N>]) -> Imported {
+    let found = imported(text, "hand");
+    let model = Model::derive(found.arm.clone()).unwrap();
+    let values: Vec<f64> = found.values.iter().map(|(_, value)| *value).collect();
+    let torque = Evaluator::new(&model, Function::InverseDynamics, SetKind::Full).unwrap();
+    for [q, dq, ddq, expected] in known {
+        let mut tau = [0.0; N];
+        torque.evaluate(q, dq, ddq, &values, &mut tau);
+        for (found, expected) in tau.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-8 * expected.abs().max(1.0), "{tau:?} {expected}");
+        }
+    }
+    found
+}
+
+#[test]
+fn a_crank_and_its_rod_are_bars() {
+    let found = compare(CRANK, &OF_CRANK);
+    let names: Vec<&str> = found.arm.bars.iter().map(|bar| bar.name.as_str()).collect();
+    assert_eq!((names, found.arm.dof()), (vec!["rod", "crank"], 5), "{}", found.text);
+    assert!(!found.notes.iter().any(|note| note.contains("left out")), "{:?}", found.notes);
+}
+
+#[test]
+fn a_stay_that_keeps_a_plate_level_is_a_bar() {
+    let found = compare(LEVEL, &OF_LEVEL);
+    assert_eq!((found.arm.bars.len(), found.arm.dof(), found.arm.links()), (1, 3, 4), "{}", found.text);
+    let mimic = found.arm.joints[2].mimic.as_ref().unwrap();
+    assert_eq!((mimic.joint, mimic.ratio.to_string(), mimic.offset.to_string()), (1, "1".into(), "0".into()));
+}
+
+#[test]
+fn loops_that_an_arm_file_has_not_are_left_out_with_a_reason() {
+    for (from, to, words) in [
+        ("anchor=\"0 0 1.1\"", "anchor=\"0 0 1.0\"", "opposite bars are equal and parallel"),
+        (
+            "<joint name=\"rod end\" axis=\"0 1 0\"/>",
+            "<joint name=\"rod end\" axis=\"0 1 0.2\"/>",
+            "not planar",
+        ),
+        (
+            "<joint name=\"rod end\" axis=\"0 1 0\"/>",
+            "<joint name=\"rod end\" type=\"slide\"/>",
+            "four bars on hinges",
+        ),
+        ("<joint name=\"rod end\" axis=\"0 1 0\"/>", "", "four bars on hinges"),
+        ("body1=\"rod\" body2=\"forearm\"", "body1=\"rod\" body2=\"hand\"", "one or two neighbouring joints"),
+        ("body1=\"rod\" body2=\"forearm\"", "body1=\"turntable\"", "four bars on hinges"),
+    ] {
+        assert!(CRANK.contains(from), "{from}");
+        let found = imported(&CRANK.replacen(from, to, 1), "hand");
+        assert!(found.arm.bars.is_empty());
+        let said = |note: &String| note.contains("<connect> is left out") && note.contains(words);
+        assert!(found.notes.iter().any(said), "{words}: {:?}", found.notes);
+        assert!(found.notes.iter().any(|note| note.contains("joint 'crank' on link")), "{:?}", found.notes);
+    }
+    let text = CRANK.replacen("body1=\"rod\"", "body1=\"rot\"", 1);
+    let error = import::any(&text, "arm.xml", &Options::default()).unwrap_err().to_string();
+    assert!(error.contains("line 35: <connect>: there is no body 'rot'"), "{error}");
+}
