@@ -1,4 +1,5 @@
-//! Generates arms of one to nine joints, for `growth.rs`, and two arms with and without contraction, for `contract.rs`.
+//! Generates arms of one to nine joints, for `growth.rs`, and two arms with and without contraction, for
+//! `contract.rs`.
 
 use dyngen::{Config, Function};
 use std::path::{Path, PathBuf};

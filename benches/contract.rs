@@ -1,7 +1,8 @@
-//! τ of the UR5e and the Panda by files with and without `--contract`, single calls and blocks of eight, in both precisions,
-//! compiled for AVX2 and for AVX-512, in one run.
+//! τ of the UR5e and the Panda by files with and without `--contract`, single calls and blocks of eight, in
+//! both precisions, compiled for AVX2 and for AVX-512, in one run.
 //!
-//! `cargo bench -p powerball-benches --bench contract -- --write docs/dyngen.md` writes its table into the page.
+//! `cargo bench -p powerball-benches --bench contract -- --write docs/dyngen.md` writes its table into the
+//! page.
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
@@ -96,8 +97,8 @@ macro_rules! row {
 }
 
 fn main() {
-    let mut table = "| τ | scalar | vectors | single, ns | contracted, ns | gain | in blocks of 8, ns | contracted, ns | \
-                     gain |\n|---|---|---|---|---|---|---|---|---|\n"
+    let mut table = "| τ | scalar | vectors | single, ns | contracted, ns | gain | in blocks of 8, ns | \
+                     contracted, ns | gain |\n|---|---|---|---|---|---|---|---|---|\n"
         .to_string();
     #[cfg(target_arch = "x86_64")]
     {

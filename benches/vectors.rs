@@ -1,7 +1,8 @@
-//! Single calls and blocks of samples of the emitted functions of the LWA 4P without rotors, in both precisions, compiled for
-//! the vectors of several kinds of processor, in one run.
+//! Single calls and blocks of samples of the emitted functions of the LWA 4P without rotors, in both
+//! precisions, compiled for the vectors of several kinds of processor, in one run.
 //!
-//! `cargo bench -p powerball-benches --bench vectors -- --write docs/results/performance.md` writes its table into the page.
+//! `cargo bench -p powerball-benches --bench vectors -- --write docs/results/performance.md` writes its table
+//! into the page.
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
@@ -28,7 +29,8 @@ enum What {
     Regressor,
 }
 
-/// Single calls and blocks of eight for a scalar; the blocks' results stay in the cache, as for one who sums them up.
+/// Single calls and blocks of eight for a scalar; the blocks' results stay in the cache, as for one who sums
+/// them up.
 macro_rules! kernels {
     ($single:ident, $blocks:ident, $scalar:ty) => {
         struct $single<'a> {
@@ -152,7 +154,8 @@ macro_rules! rows {
 }
 
 fn main() {
-    let mut table = "| a sample | scalar | vectors | one at a time, ns | blocks of 8, ns | throughput | millions a second |\n\
+    let mut table = "| a sample | scalar | vectors | one at a time, ns | blocks of 8, ns | throughput | \
+        millions a second |\n\
                      |---|---|---|---|---|---|---|\n"
         .to_string();
     rows!(table, SingleF64, BlocksF64, f64);

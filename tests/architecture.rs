@@ -1,5 +1,6 @@
-//! ARCHITECTURE.md is true: every folder that it lists is there, every folder of the sources is listed, code uses what
-//! stands further up and nothing that stands further down, and folders do not use each other in a circle.
+//! ARCHITECTURE.md is true: every folder that it lists is there, every folder of the sources is listed, code
+//! uses what stands further up and nothing that stands further down, and folders do not use each other in a
+//! circle.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -23,8 +24,9 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Places of a crate's sources in the order of the page: `log` for the row of `powerball/logs/src/log/`, `model` for
-/// that of `dyngen/src/model.rs`; empty for the row of a whole crate. One row may name several; they stand in the order in which it names them.
+/// Places of a crate's sources in the order of the page: `log` for the row of `powerball/logs/src/log/`,
+/// `model` for that of `dyngen/src/model.rs`; empty for the row of a whole crate. One row may name several;
+/// they stand in the order in which it names them.
 fn order(page: &str, name: &str) -> Vec<String> {
     let rows = page.lines().filter(|line| line.starts_with('|'));
     let cells = rows.filter_map(|line| line.split('|').nth(1));
@@ -49,7 +51,8 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// A file's module path below the crate, `["logs", "log", "read"]`; nothing for tests, whose use of other rooms is free.
+/// A file's module path below the crate, `["logs", "log", "read"]`; nothing for tests, whose use of other
+/// rooms is free.
 fn module(source: &Path, file: &Path) -> Option<Vec<String>> {
     let inside = file.strip_prefix(source).unwrap().with_extension("");
     let mut parts: Vec<String> = inside.iter().map(|p| p.to_string_lossy().into_owned()).collect();
@@ -68,7 +71,8 @@ fn code(file: &Path) -> String {
     code.filter(|line| !line.trim_start().starts_with("//")).map(|line| format!("{line}\n")).collect()
 }
 
-/// Every path that begins with `start` (`crate`, `super`), as its segments after that; groups in braces are followed.
+/// Every path that begins with `start` (`crate`, `super`), as its segments after that; groups in braces are
+/// followed.
 fn paths(code: &str, start: &str) -> Vec<Vec<String>> {
     let mut found = Vec::new();
     for (at, _) in code.match_indices(&format!("{start}::")) {
@@ -212,8 +216,8 @@ fn folders_do_not_use_each_other_in_a_circle() {
     assert!(circles.is_empty(), "each of these arrows is part of a circle:\n{}", circles.join("\n"));
 }
 
-/// What stands below itself in the table of a folder's `mod.rs`, which gives its files in the order in which they may
-/// use each other.
+/// What stands below itself in the table of a folder's `mod.rs`, which gives its files in the order in which
+/// they may use each other.
 fn against_the_table(crate_source: &str, folder: &str) -> BTreeSet<String> {
     let source = root().join(crate_source);
     let page = fs::read_to_string(source.join(folder).join("mod.rs")).unwrap();

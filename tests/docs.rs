@@ -168,8 +168,8 @@ fn doc_comments_are_in_plain_words() {
     assert!(files.len() > 400 && wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Python's `Rule` is written from the one of Rust: the same fields, words and defaults. With `POWERBALL_BLESS` set it is
-/// written anew.
+/// Python's `Rule` is written from the one of Rust: the same fields, words and defaults. With
+/// `POWERBALL_BLESS` set it is written anew.
 #[test]
 fn the_thresholds_of_python_are_those_of_rust() {
     let source = std::fs::read_to_string(root().join("powerball/explanation/src/rule.rs")).unwrap();

@@ -203,8 +203,8 @@ fn skew_axes_on_a_tilted_base() {
     check(ODD, None, &["one", "two", "three"], "c");
 }
 
-/// Three axes that calibration made almost parallel: their common normals are tens of metres away, the frames are
-/// not, and the arm is the same.
+/// Three axes that calibration made almost parallel: their common normals are tens of metres away, the frames
+/// are not, and the arm is the same.
 #[test]
 fn almost_parallel_axes_have_their_frames_near_the_arm() {
     let elbow = "<origin xyz=\"0.4318 0 -0.0934\"/>";

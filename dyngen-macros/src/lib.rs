@@ -1,5 +1,5 @@
-//! An arm's dynamics in place, from its arm file: procedural macros over [`dyngen`], whose front page names the
-//! paper that equations are cited from.
+//! An arm's dynamics in place, from its arm file: procedural macros over [`dyngen`], whose front page names
+//! the paper that equations are cited from.
 //!
 //! ```
 //! mod arm {

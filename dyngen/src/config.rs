@@ -164,8 +164,8 @@ impl Config {
         self
     }
 
-    /// Lets sums take products in: a·b + c is one operation that rounds once, on processors that have it. Bits
-    /// are then no longer those of every machine.
+    /// Lets sums take products in: a·b + c is one operation that rounds once, on processors that have it.
+    /// Bits are then no longer those of every machine.
     #[must_use]
     pub fn contract(mut self, contract: bool) -> Self {
         self.options.contract = contract;
@@ -181,7 +181,8 @@ impl Config {
         Ok(texts.into_iter().next().map(|(_, text)| text).unwrap_or_default())
     }
 
-    /// The files that [`Config::write`] writes, with their texts: `file`, and in C the header of the same name.
+    /// The files that [`Config::write`] writes, with their texts: `file`, and in C the header of the same
+    /// name.
     ///
     /// # Errors
     /// Those of [`Config::source`].
@@ -264,8 +265,8 @@ impl Config {
         Ok(std::iter::once(file.to_path_buf()).chain(header).collect())
     }
 
-    /// Writes the generated file, in C with its header; a file that is there already is replaced as a whole or not at
-    /// all.
+    /// Writes the generated file, in C with its header; a file that is there already is replaced as a whole
+    /// or not at all.
     ///
     /// # Errors
     /// Those of [`Config::source`], and where a file cannot be written.

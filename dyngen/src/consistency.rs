@@ -79,8 +79,8 @@ pub fn check(model: &Model, kind: SetKind, values: &[f64]) -> Result<Possibility
     })
 }
 
-/// The smallest eigenvalue of a function that is a symmetric matrix of at most [`MAX_JOINTS`] rows, and the pose within
-/// the limits where it was found, rad or m.
+/// The smallest eigenvalue of a function that is a symmetric matrix of at most [`MAX_JOINTS`] rows, and the
+/// pose within the limits where it was found, rad or m.
 ///
 /// # Errors
 /// As [`Model::function`].

@@ -1,9 +1,11 @@
-//! From a robot arm's geometry to its dynamics: exact base parameters, and code for a controller that is proven equal to the Lagrangian.
+//! From a robot arm's geometry to its dynamics: exact base parameters, and code for a controller that is
+//! proven equal to the Lagrangian.
 //!
-//! What goes in is an arm file: DH table, declared symmetries, rotors, limits ([`Arm`]; `dyngen import` writes one from a
-//! URDF or a MuJoCo model). What comes out: the parameters that torques depend on ([`ParameterSet`]), and any function of
-//! the arm ([`Function`]: regressor, B, C, g, inverse and forward dynamics, derivatives, kinematics) as Rust without
-//! allocation, C99, CUDA or WGSL, or evaluated here. Nothing is emitted or evaluated before it was proven.
+//! What goes in is an arm file: DH table, declared symmetries, rotors, limits ([`Arm`]; `dyngen import`
+//! writes one from a URDF or a MuJoCo model). What comes out: the parameters that torques depend on
+//! ([`ParameterSet`]), and any function of the arm ([`Function`]: regressor, B, C, g, inverse and forward
+//! dynamics, derivatives, kinematics) as Rust without allocation, C99, CUDA or WGSL, or evaluated here.
+//! Nothing is emitted or evaluated before it was proven.
 //!
 //! # In a build script
 //!
@@ -45,12 +47,12 @@
 //!
 //! # Modules, in the order of use
 //!
-//! [`arm`] describes an arm, [`import`] reads other files, [`describe`] reports what is known of it, [`consistency`] checks
-//! values, [`emit`] writes code, [`verify`] proves a file that was written, [`export`] writes values back into a URDF or a
-//! MuJoCo model, [`rounding`] bounds the error of floating point.
+//! [`arm`] describes an arm, [`import`] reads other files, [`describe`] reports what is known of it,
+//! [`consistency`] checks values, [`emit`] writes code, [`verify`] proves a file that was written, [`export`]
+//! writes values back into a URDF or a MuJoCo model, [`rounding`] bounds the error of floating point.
 //!
-//! "The paper" is *Modeling and dynamic parameter identification of the SCHUNK Powerball robotic arm*; equations
-//! and tables that are cited by number are its own.
+//! "The paper" is *Modeling and dynamic parameter identification of the SCHUNK Powerball robotic arm*;
+//! equations and tables that are cited by number are its own.
 
 pub mod arm;
 pub mod base;

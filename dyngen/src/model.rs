@@ -69,8 +69,8 @@ impl fmt::Display for Error {
             Error::Disagreement(e) => e.fmt(f),
             Error::Missing(function) => write!(
                 f,
-                "the arm has no {function}: its tool cannot accelerate in every direction, whatever its joints do; \
-                 take task_inertia_inverse, which every arm has"
+                "the arm has no {function}: its tool cannot accelerate in every direction, whatever its \
+                 joints do; take task_inertia_inverse, which every arm has"
             ),
             Error::NeedsEveryParameter(function) => write!(
                 f,

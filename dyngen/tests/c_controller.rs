@@ -1,4 +1,5 @@
-//! Generated C on an emulated Cortex-M4F and Cortex-M7: the bits of the host, and single precision without doubles.
+//! Generated C on an emulated Cortex-M4F and Cortex-M7: the bits of the host, and single precision without
+//! doubles.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 

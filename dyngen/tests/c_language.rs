@@ -1,5 +1,5 @@
-//! Generated C against the generated Rust: both are compiled, and give the same bits for every function, in double and in
-//! single precision.
+//! Generated C against the generated Rust: both are compiled, and give the same bits for every function, in
+//! double and in single precision.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -225,7 +225,8 @@ fn main_in_c(case: &Case, model: &Model) -> String {
         let _ = if is_number(f) {
             writeln!(
                 body,
-                "        {{ real x = {prefix}_{name}({plain}); put(&x, 1); x = {prefix}_{name}_with(&trig{with}); put(&x, 1); }}"
+                "        {{ real x = {prefix}_{name}({plain}); put(&x, 1); x = \
+                {prefix}_{name}_with(&trig{with}); put(&x, 1); }}"
             )
         } else {
             writeln!(
@@ -240,15 +241,17 @@ fn main_in_c(case: &Case, model: &Model) -> String {
         let _ = writeln!(
             body,
             "        {{ real c[{n}][{terms}]; real k[{n}][{terms}]; real f2[{n}]; \
-             for (i = 0; i < {n} * {terms}; i++) k[i / {terms}][i % {terms}] = tau[i / {terms}] + dq[i % {terms}]; \
-             {prefix}_friction_columns(dq, c); put(&c[0][0], {n} * {terms}); \
+             for (i = 0; i < {n} * {terms}; i++) k[i / {terms}][i % {terms}] = tau[i / {terms}] + dq[i % \
+             {terms}]; {prefix}_friction_columns(dq, c); put(&c[0][0], {n} * {terms}); \
              {prefix}_friction(dq, (const real(*)[{terms}])k, f2); put(f2, {n}); }}"
         );
     }
     format!(
         "#include \"{}.h\"\n#include <stdio.h>\n#include <stdlib.h>\ntypedef {prefix}_real real;\n\
-         static double next(void) {{ double x; if (fread(&x, sizeof x, 1, stdin) != 1) exit(0); return x; }}\n\
-         static void put(const real *x, int n) {{ int i; for (i = 0; i < n; i++) {{ double y = (double)x[i]; fwrite(&y, sizeof y, 1, stdout); }} }}\n\
+         static double next(void) {{ double x; if (fread(&x, sizeof x, 1, stdin) != 1) exit(0); return x; \
+         }}\n\
+         static void put(const real *x, int n) {{ int i; for (i = 0; i < n; i++) {{ double y = (double)x[i]; \
+         fwrite(&y, sizeof y, 1, stdout); }} }}\n\
          int main(void) {{\n    int i;\n    for (;;) {{\n{body}    }}\n}}\n",
         case.name
     )
@@ -280,14 +283,15 @@ fn main_in_rust(case: &Case, model: &Model) -> String {
     if !case.friction.is_empty() {
         let _ = writeln!(
             body,
-            "        let k = SMatrix::<T, {{ {name}::JOINTS }}, {}>::from_fn(|i, j| tau[i] + dq[j]);\n        \
-             put({name}::friction_columns(&dq).transpose().as_slice());\n        \
+            "        let k = SMatrix::<T, {{ {name}::JOINTS }}, {}>::from_fn(|i, j| tau[i] + \
+             dq[j]);\n        put({name}::friction_columns(&dq).transpose().as_slice());\n        \
              put({name}::friction(&dq, &k).as_slice());",
             case.friction.len()
         );
     }
     format!(
-        "mod {name} {{ include!(\"{name}.inc\"); }}\nfn run_{name}<T: Real>(mut next: Input) {{\n    while !next.0.is_empty() {{\n{body}    }}\n}}\n"
+        "mod {name} {{ include!(\"{name}.inc\"); }}\nfn run_{name}<T: Real>(mut next: Input) {{\n    while \
+        !next.0.is_empty() {{\n{body}    }}\n}}\n"
     )
 }
 
@@ -327,7 +331,8 @@ fn states(case: &Case, model: &Model) -> Vec<f64> {
                 (Argument::Positions, 0) => 0.7,
                 (Argument::Positions, 1) => 3.0,
                 (Argument::Positions, 2) => 40.0,
-                // 1.5 times as much is the angle of a joint that follows, and added to others still below 10⁵.
+                // 1.5 times as much is the angle of a joint that follows, and added to others still below
+                // 10⁵.
                 (Argument::Positions, _) => 2e4,
                 _ => 2.0,
             };
@@ -370,7 +375,8 @@ fn compile(compiler: &str, arguments: &[&str], files: &[PathBuf]) {
 
 /// The program in Rust with all arms.
 fn built_rust(cases: &[(Case, Model)]) -> PathBuf {
-    let manifest = "[package]\nname = \"c_language\"\nversion = \"0.0.0\"\nedition = \"2024\"\n[workspace]\n[dependencies]\n\
+    let manifest = "[package]\nname = \"c_language\"\nversion = \"0.0.0\"\nedition = \
+        \"2024\"\n[workspace]\n[dependencies]\n\
                     nalgebra = { version = \"0.35\", default-features = false, features = [\"libm\"] }\n";
     file("Cargo.toml", manifest);
     // No processor is asked for one here: it is a function of libm.

@@ -490,7 +490,8 @@ fn nothing_is_lost_and_no_nan_is_printed() {
     assert!(message.contains("states.csv:2") && message.contains("singular"), "{message}");
 }
 
-/// What need not end is no input: it is refused before it is opened, which of a pipe without a writer never returns.
+/// What need not end is no input: it is refused before it is opened, which of a pipe without a writer never
+/// returns.
 #[cfg(unix)]
 #[test]
 fn pipes_and_devices_are_refused() {
@@ -512,12 +513,14 @@ fn pipes_and_devices_are_refused() {
     }
 }
 
-/// A rod of negative inertia is generated, with a warning that says why and what to take; units that no arm has end with 3.
+/// A rod of negative inertia is generated, with a warning that says why and what to take; units that no arm
+/// has end with 3.
 #[test]
 fn what_no_arm_can_have_is_said() {
     let rod = |a: &str, gravity: &str| {
         format!(
-            "name = \"rod\"\nconvention = \"standard\"\ngravity = [0, {gravity}, 0]\n[[joint]]\nkind = \"revolute\"\n\
+            "name = \"rod\"\nconvention = \"standard\"\ngravity = [0, {gravity}, 0]\n[[joint]]\nkind = \
+            \"revolute\"\n\
              a = {a}\nalpha = 0\nd = 0\ntheta = 0\n"
         )
     };

@@ -8,9 +8,9 @@ use dyngen::{Evaluator, Function, Model, SetKind};
 const CRANK: &str = include_str!("mjcf/crank.xml");
 const LEVEL: &str = include_str!("mjcf/level.xml");
 
-/// From MuJoCo 4.0.0: q, q̇ and q̈ of the joints that move on their own, and their torques. The others' motion is solved from
-/// the equality's Jacobian and its rate; the torques are Gᵀ times those of mj_inverse for the tree without the equality,
-/// where G maps velocities.
+/// From MuJoCo 4.0.0: q, q̇ and q̈ of the joints that move on their own, and their torques. The others'
+/// motion is solved from the equality's Jacobian and its rate; the torques are Gᵀ times those of mj_inverse
+/// for the tree without the equality, where G maps velocities.
 type Known<const N: usize> = [[f64; N]; 4];
 const OF_CRANK: [Known<5>; 2] = [
     [

@@ -1,6 +1,6 @@
-//! What optimal control asks for: derivatives of the accelerations, rates of B and J, and the tool's inertia, of arms in
-//! both conventions with sliding, coupled and following joints. Each function is proven against the Lagrangian as it is
-//! built; here it is compared with other functions at states drawn by lot.
+//! What optimal control asks for: derivatives of the accelerations, rates of B and J, and the tool's inertia,
+//! of arms in both conventions with sliding, coupled and following joints. Each function is proven against
+//! the Lagrangian as it is built; here it is compared with other functions at states drawn by lot.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 

@@ -95,8 +95,8 @@ fn other_laws_are_left_out_and_reported() {
         .map(|j| format!("{{\"joint\": {j}, \"gamma1\": 0.5, \"gamma3\": 0.25, \"gamma5\": 1.5}}"))
         .collect();
     let model = format!(
-        "{{\"friction\": [{}], \"terms\": [{{\"effect\": \"spring\", \"joint\": 6, \"coefficient\": 1, \"law\": \
-         \"position\"}}]}}",
+        "{{\"friction\": [{}], \"terms\": [{{\"effect\": \"spring\", \"joint\": 6, \"coefficient\": 1, \
+         \"law\": \"position\"}}]}}",
         friction.join(", ")
     );
     let known = Known::read(&puma.arm, (&puma.values_json(), "v.json"), Some((&model, "m.json"))).unwrap();
@@ -142,8 +142,8 @@ fn an_export_into_an_export_is_one() {
     let none = exported(
         &twice.text,
         "{\"friction\": [{\"joint\": 1, \"gamma1\": 0, \"gamma3\": 0, \"gamma5\": 0}, \
-        {\"joint\": 2, \"gamma1\": 0, \"gamma3\": 0, \"gamma5\": 0}, {\"joint\": 3, \"gamma1\": 0, \"gamma3\": 0, \
-        \"gamma5\": 0}, {\"joint\": 4, \"gamma1\": 0, \"gamma3\": 0, \"gamma5\": 0}]}",
+        {\"joint\": 2, \"gamma1\": 0, \"gamma3\": 0, \"gamma5\": 0}, {\"joint\": 3, \"gamma1\": 0, \
+        \"gamma3\": 0, \"gamma5\": 0}, {\"joint\": 4, \"gamma1\": 0, \"gamma3\": 0, \"gamma5\": 0}]}",
     );
     assert!(motors(&none.text).is_empty() && none.text.contains("<key act=\"0.5\"/>"), "{}", none.text);
 
@@ -183,7 +183,8 @@ fn a_spring_is_the_joints_stiffness() {
     );
 }
 
-/// What sits on a motor that turns with several joints sits on a tendon that is as long as the motor has turned.
+/// What sits on a motor that turns with several joints sits on a tendon that is as long as the motor has
+/// turned.
 #[test]
 fn a_motor_of_several_joints_is_a_tendon() {
     let imported = import::mjcf(ARM, "arm.xml", &exact()).unwrap();

@@ -169,11 +169,12 @@ fn a_mujoco_model_is_written_and_read_again() {
 fn a_position_servo_is_written_as_mujocos() {
     let one = |j: usize, more: &str| {
         format!(
-            "{{\"joint\": {j}, \"absolute\": true, \"parameters\": [{{\"name\": \"torque\", \"value\": 3.0, \"std\": 0.1}}, \
-             {{\"name\": \"gain\", \"value\": 0.5, \"std\": 0.01}}, {{\"name\": \"kp\", \"value\": 16.0, \"std\": null, \
-             \"known\": true}}, {{\"name\": \"kd\", \"value\": 0.25, \"std\": null}}, {{\"name\": \"armature\", \"value\": \
-             0.03125, \"std\": 0.001}}, {{\"name\": \"viscous\", \"value\": 0.25, \"std\": 0.01}}, {{\"name\": \
-             \"back_emf\", \"value\": 0.5, \"std\": 0.02}}, {{\"name\": \"coulomb\", \"value\": 0.0625, \"std\": 0.001}}{more}]}}"
+            "{{\"joint\": {j}, \"absolute\": true, \"parameters\": [{{\"name\": \"torque\", \"value\": 3.0, \
+             \"std\": 0.1}}, {{\"name\": \"gain\", \"value\": 0.5, \"std\": 0.01}}, {{\"name\": \"kp\", \
+             \"value\": 16.0, \"std\": null, \"known\": true}}, {{\"name\": \"kd\", \"value\": 0.25, \
+             \"std\": null}}, {{\"name\": \"armature\", \"value\": 0.03125, \"std\": 0.001}}, {{\"name\": \
+             \"viscous\", \"value\": 0.25, \"std\": 0.01}}, {{\"name\": \"back_emf\", \"value\": 0.5, \
+             \"std\": 0.02}}, {{\"name\": \"coulomb\", \"value\": 0.0625, \"std\": 0.001}}{more}]}}"
         )
     };
     let load = ", {\"name\": \"load\", \"value\": 0.375, \"std\": 0.01}";

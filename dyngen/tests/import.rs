@@ -42,7 +42,8 @@ fn limits_and_names_are_kept_and_what_is_left_out_is_said() {
     assert_eq!(m1, 3.0 + 1.5);
 }
 
-/// A point of a link reads as in the description, in either convention: here each centre of mass, whose numbers stand there.
+/// A point of a link reads as in the description, in either convention: here each centre of mass, whose
+/// numbers stand there.
 #[test]
 fn centres_of_mass_are_the_descriptions_own_in_the_frame_of_the_link() {
     let centre = |text: &str| {
@@ -172,8 +173,8 @@ fn refusal(text: &str, tip: Option<&str>) -> String {
     }
 }
 
-/// A follower on the chain is a link of the arm without a coordinate; what follows a joint that is held is held
-/// where the ratio takes it.
+/// A follower on the chain is a link of the arm without a coordinate; what follows a joint that is held is
+/// held where the ratio takes it.
 #[test]
 fn a_joint_that_follows_another_is_coupled_or_held_with_it() {
     let text = ODD.replacen(

@@ -1,8 +1,9 @@
-//! Closed loops: bars on the chain, against point masses on linkages whose loops are closed by intersecting circles.
+//! Closed loops: bars on the chain, against point masses on linkages whose loops are closed by intersecting
+//! circles.
 //!
-//! The reference knows no frames of bars, no forces in pins and no parallels: a pin is where two bars of given
-//! lengths meet, points move with the bars, and the torques are those of d'Alembert's principle,
-//! τᵢ = Σ m ∂x/∂qᵢ·(ẍ − g), with exact derivatives along a path.
+//! The reference knows no frames of bars, no forces in pins and no parallels: a pin is where two bars of
+//! given lengths meet, points move with the bars, and the torques are those of d'Alembert's principle, τᵢ = Σ
+//! m ∂x/∂qᵢ·(ẍ − g), with exact derivatives along a path.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -152,8 +153,8 @@ fn linkages(text: &str) -> Vec<Linkage> {
     }
 }
 
-/// Where two circles of a plane meet: the point at distances `from_a` of a and `from_b` of b, on the left of the
-/// way from a to b, about the plane's normal, or on its right.
+/// Where two circles of a plane meet: the point at distances `from_a` of a and `from_b` of b, on the left of
+/// the way from a to b, about the plane's normal, or on its right.
 fn meet(a: Vector, from_a: f64, b: Vector, from_b: f64, normal: Vector, left: bool) -> Vector {
     let way = minus(b, a);
     // Within the plane.
@@ -169,7 +170,8 @@ fn meet(a: Vector, from_a: f64, b: Vector, from_b: f64, normal: Vector, left: bo
     plus(a, plus(scaled(share, way), scaled(if left { height } else { -height }, aside)))
 }
 
-/// The frames of all bodies, links then bars, where the coordinates move along a path. Bars have x along the bar.
+/// The frames of all bodies, links then bars, where the coordinates move along a path. Bars have x along the
+/// bar.
 fn frames(arm: &Arm, loops: &[Linkage], q: &[Along]) -> Vec<Frame> {
     let mut next = q.iter().copied();
     let mut frame = Frame::world();
@@ -202,13 +204,15 @@ fn frames(arm: &Arm, loops: &[Linkage], q: &[Along]) -> Vec<Frame> {
     links
 }
 
-/// Sine and cosine by which a joint turns that its loop holds: its pin is where the outer bar and the rod meet.
+/// Sine and cosine by which a joint turns that its loop holds: its pin is where the outer bar and the rod
+/// meet.
 fn closed(linkage: &Linkage, before: &[Frame], frame: Frame) -> (Along, Along) {
     let [_, outer, rod, inner] = linkage.lengths;
     let base = before[linkage.first];
     let foot = base.at(inner, linkage.inner);
     let normal = base.axes[2];
-    // Opposite bars do not cross: from the last joint the pin is on the side on which the foot is from the first.
+    // Opposite bars do not cross: from the last joint the pin is on the side on which the foot is from the
+    // first.
     let link = minus(frame.origin, base.origin);
     let side = |v: Vector| {
         let (u, n) = (link.map(|x| x.0), normal.map(|x| x.0));

@@ -27,7 +27,8 @@ joint = [
 ]
 "#;
 
-/// Halves, multiples and decimals, forwards and backwards, a lift of two stages, and a motor of a joint that follows.
+/// Halves, multiples and decimals, forwards and backwards, a lift of two stages, and a motor of a joint that
+/// follows.
 const MIXED: &str = r#"
 name = "mixed"
 convention = "standard"

@@ -112,8 +112,8 @@ fn drives_and_ranges_are_kept() {
     );
 }
 
-/// Mass, centre, and inertia xx yy zz xy xz yz about it in the body's axes, as MuJoCo 4.0 compiles them of the shapes
-/// below.
+/// Mass, centre, and inertia xx yy zz xy xz yz about it in the body's axes, as MuJoCo 4.0 compiles them of
+/// the shapes below.
 #[rustfmt::skip]
 const SHAPES: [f64; 10] = [
     31.40730628757113, 0.10379043886602604, 0.058738253679611156, 0.17348647716053014, 1.8679184458164453, 1.196128181926393, 1.0930137819695247, -0.03156059859280793, -0.20321367401383497, 0.12612581150268465,

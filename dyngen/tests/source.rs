@@ -1,4 +1,5 @@
-//! Robot descriptions from the disk: what a model includes is in it, and letters are read as they were written.
+//! Robot descriptions from the disk: what a model includes is in it, and letters are read as they were
+//! written.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 

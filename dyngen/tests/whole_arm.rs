@@ -1,5 +1,6 @@
-//! Payloads, second derivatives, the whole arm's mass and momentum, and the forms of the Jacobian: each function is proven
-//! against the Lagrangian as it is built; here it is compared with other functions at states drawn by lot.
+//! Payloads, second derivatives, the whole arm's mass and momentum, and the forms of the Jacobian: each
+//! function is proven against the Lagrangian as it is built; here it is compared with other functions at
+//! states drawn by lot.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 

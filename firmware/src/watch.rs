@@ -1,7 +1,7 @@
 //! The test whether a model still holds, in a controller's cycle.
 //!
-//! It is asked at the rate of its rows, every fourth cycle at 200 Hz. In between the joints take turns, so that no cycle
-//! pays for all of them.
+//! The test is asked at the rate of its rows, every fourth cycle at 200 Hz. In between the joints take turns,
+//! so that no cycle pays for all of them.
 
 use crate::cycle::Joints;
 use powerball::controller::change::{Alarm, Bet, Colour, Joint, Standing, Term, Whitener, alarm};
@@ -62,8 +62,8 @@ impl Test {
 }
 
 impl Watch {
-    /// A row in the first of [`TURNS`] cycles; whether its alarm rises, in the last. Measured less predicted torque and the
-    /// model's friction, N·m.
+    /// A row in the first of [`TURNS`] cycles; whether its alarm rises, in the last. Measured less predicted
+    /// torque and the model's friction, N·m.
     pub fn turn(&mut self, residual: &Joints, friction: &Joints) -> bool {
         if self.next == 0 {
             self.rows += 1;

@@ -1,5 +1,5 @@
-//! Frames of a CAN bus and the datagrams that carry them: what is read of one is written as it was read, and a driver
-//! that hears them never panics.
+//! Frames of a CAN bus and the datagrams that carry them: what is read of one is written as it was read, and
+//! a driver that hears them never panics.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

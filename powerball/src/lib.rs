@@ -1,13 +1,13 @@
-//! From a robot arm's logs to a torque model with everything that the rigid model lacks; the model on a controller; the
-//! arm on its CAN bus.
+//! From a robot arm's logs to a torque model with everything that the rigid model lacks; the model on a
+//! controller; the arm on its CAN bus.
 //!
-//! [`identify()`] fits base parameters and friction to logs of positions and torques, with confidence intervals. [`explain()`]
-//! finds the residual, names effects that cause it (payload, hysteresis, spring, delay, …), and checks each on a path that
-//! was not fitted. [`compare()`] reports what differs between two fits. The arm comes from an arm file
-//! ([`dyngen::Arm`](https://docs.rs/dyngen)).
+//! [`identify()`] fits base parameters and friction to logs of positions and torques, with confidence
+//! intervals. [`explain()`] finds the residual, names effects that cause it (payload, hysteresis, spring,
+//! delay, …), and checks each on a path that was not fitted. [`compare()`] reports what differs between two
+//! fits. The arm comes from an arm file ([`dyngen::Arm`](https://docs.rs/dyngen)).
 //!
-//! Each module is a package of its own (`powerball-controller` and so on) and a Cargo feature here: you build only what you
-//! use. A module uses those above it in this table, never one below it.
+//! Each module is a package of its own (`powerball-controller` and so on) and a Cargo feature here: you build
+//! only what you use. A module uses those above it in this table, never one below it.
 //!
 //! | module | feature | `std` | contents |
 //! |---|---|---|---|

@@ -23,8 +23,8 @@ fn scratch(name: &str) -> PathBuf {
     folder
 }
 
-/// Logs of an arm whose friction grows with the load: fitted ones, and those of another path. They are recorded
-/// once, and every test has them in a folder of its own.
+/// Logs of an arm whose friction grows with the load: fitted ones, and those of another path. They are
+/// recorded once, and every test has them in a folder of its own.
 fn session(name: &str) -> (PathBuf, Vec<String>, Vec<String>) {
     static RECORDED: OnceLock<Session> = OnceLock::new();
     let recorded =

@@ -94,7 +94,8 @@ fn what_was_identified_is_in_a_copy_of_the_urdf() {
     assert!(text.contains("<!-- kept as it is -->"));
     assert_eq!(fs::read_to_string(folder.join("two.urdf")).unwrap(), URDF);
 
-    // The bodies of the copy are those of the result, and in what an arm's torque depends on those that were recorded.
+    // The bodies of the copy are those of the result, and in what an arm's torque depends on those that were
+    // recorded.
     let back = import::urdf(&text, "two.urdf", &Options::default()).unwrap();
     let named =
         |values: &[(String, f64)]| Values::named(values.iter().map(|(n, v)| (n.as_str(), *v)), "values");
@@ -112,7 +113,8 @@ fn what_was_identified_is_in_a_copy_of_the_urdf() {
         approx::assert_relative_eq!(value, written, max_relative = 1e-9, epsilon = 1e-12);
         approx::assert_relative_eq!(value, truth, max_relative = 0.05, epsilon = 2e-3);
     }
-    // The errors of its Coulomb friction are those of the sum of both terms, of which neither is known by itself.
+    // The errors of its Coulomb friction are those of the sum of both terms, of which neither is known by
+    // itself.
     let errors = text.split("friction ").skip(1).filter_map(|rest| rest.split(' ').next());
     let errors: Vec<f64> = errors.filter_map(|error| error.parse().ok()).collect();
     assert!(errors.len() == 2 && errors.iter().all(|error| (1e-4..0.02).contains(error)), "{text}");
@@ -136,7 +138,8 @@ fn the_original_is_never_written_over() {
     assert!(!folder.join("identified.json").exists());
 }
 
-/// A file of the command's own is written anew, one of somebody else is not, and what holds no load is refused.
+/// A file of the command's own is written anew, one of somebody else is not, and what holds no load is
+/// refused.
 #[test]
 fn a_load_is_exported_for_each_controller() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("export_load");
@@ -192,7 +195,8 @@ fn identified(arm: &Arm, values: &[(dyngen::arm::Parameter, f64)], scale: f64) -
         "friction": friction.collect::<Vec<_>>(), "consistent": {"parameters": bodies}})
 }
 
-/// Each form has the arm's bodies and friction, and lists what it lacks; errors name what is missing or not supported.
+/// Each form has the arm's bodies and friction, and lists what it lacks; errors name what is missing or not
+/// supported.
 #[test]
 fn an_arm_is_exported_for_each_simulator() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("export_arm");

@@ -20,7 +20,8 @@ const CHECKS: [(&str, Check); 9] = [
     ("one-chain", || refused_import(&urdf("revolute", FORK), "tree")),
     ("xacro", || {
         refused_import(
-            "<robot xmlns:xacro=\"http://ros.org/wiki/xacro\" name=\"a\"><link name=\"${base}\"/><xacro:arm/></robot>",
+            "<robot xmlns:xacro=\"http://ros.org/wiki/xacro\" name=\"a\"><link \
+            name=\"${base}\"/><xacro:arm/></robot>",
             "xacro",
         )
     }),
@@ -68,15 +69,18 @@ fn what_is_quoted_stands_on_its_page() {
     }
 }
 
-const LINK: &str = "<inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>";
-const FORK: &str = "<joint name=\"other\" type=\"revolute\"><parent link=\"base\"/><child link=\"second\"/><axis xyz=\"0 1 0\"/>\
+const LINK: &str = "<inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\" ixy=\"0\" ixz=\"0\" \
+    iyz=\"0\"/></inertial>";
+const FORK: &str = "<joint name=\"other\" type=\"revolute\"><parent link=\"base\"/><child \
+    link=\"second\"/><axis xyz=\"0 1 0\"/>\
     <limit lower=\"-1\" upper=\"1\" effort=\"1\" velocity=\"1\"/></joint><link name=\"second\"/>";
 
 /// A robot of one joint of a kind, and more.
 fn urdf(kind: &str, more: &str) -> String {
     format!(
         "<robot name=\"a\"><link name=\"base\"/><link name=\"link\">{LINK}</link>\
-         <joint name=\"turn\" type=\"{kind}\"><parent link=\"base\"/><child link=\"link\"/><axis xyz=\"0 0 1\"/>\
+         <joint name=\"turn\" type=\"{kind}\"><parent link=\"base\"/><child link=\"link\"/><axis xyz=\"0 0 \
+         1\"/>\
          <limit lower=\"-1\" upper=\"1\" effort=\"1\" velocity=\"1\"/></joint>{more}</robot>"
     )
 }
@@ -91,7 +95,8 @@ fn refused_import(text: &str, with: &str) -> Result<(), String> {
 
 fn mjcf(joint: &str, more: &str) -> String {
     format!(
-        "<mujoco><worldbody><body name=\"one\"><inertial mass=\"1\" pos=\"0 0 0\" diaginertia=\"1 1 1\"/>{joint}\
+        "<mujoco><worldbody><body name=\"one\"><inertial mass=\"1\" pos=\"0 0 0\" diaginertia=\"1 1 \
+        1\"/>{joint}\
          <body name=\"two\" pos=\"1 0 0\"><inertial mass=\"1\" pos=\"0 0 0\" diaginertia=\"1 1 1\"/>\
          <joint name=\"second\" type=\"hinge\"/></body></body></worldbody>{more}</mujoco>"
     )
@@ -131,10 +136,11 @@ fn arm() -> Arm {
 }
 
 fn arm_text() -> String {
-    let joint = "{ kind = \"revolute\", a = 0.3, alpha = \"pi/2\", d = 0.1, theta = 0, position = [-1, 1], velocity = 1, \
-                 acceleration = 1, torque = 1 }";
+    let joint = "{ kind = \"revolute\", a = 0.3, alpha = \"pi/2\", d = 0.1, theta = 0, position = [-1, 1], \
+                 velocity = 1, acceleration = 1, torque = 1 }";
     format!(
-        "name = \"two\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\njoint = [\n{joint},\n{joint},\n]\n"
+        "name = \"two\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\njoint = \
+        [\n{joint},\n{joint},\n]\n"
     )
 }
 

@@ -1,4 +1,5 @@
-//! Each format at its edges: damaged files, files that others left, and files that others must be able to read.
+//! Each format at its edges: damaged files, files that others left, and files that others must be able to
+//! read.
 //!
 //! Files of others were written by the formats' own libraries in Python: tests/logs_data/formats.py.
 
@@ -136,7 +137,8 @@ fn chunks_of_other_topics_are_not_read() {
     assert!(error.contains("/camera"), "{error}");
 }
 
-/// What rosbag2 and Foxglove need to play a file: chunks, their index, statistics, checksums; joints have their names.
+/// What rosbag2 and Foxglove need to play a file: chunks, their index, statistics, checksums; joints have
+/// their names.
 #[test]
 fn what_is_written_as_mcap_has_chunks_an_index_statistics_and_checksums() {
     let names = ["shoulder", "elbow"].map(String::from);
@@ -313,8 +315,8 @@ fn messages_of_any_type_are_read_by_the_definition_in_their_file() {
     assert!(arm.columns.iter().all(|c| !c.name.starts_with("cloud")), "{:?}", arm.names());
 }
 
-/// Messages of Protocol Buffers by mcap-protobuf-support, and objects of JSON: lists with their names, and joints each with
-/// its name.
+/// Messages of Protocol Buffers by mcap-protobuf-support, and objects of JSON: lists with their names, and
+/// joints each with its name.
 #[test]
 fn messages_of_protobuf_and_json_are_read_whatever_names_their_joints() {
     let (csv, _) = read(&data("log.csv"), "");
@@ -427,8 +429,8 @@ fn actions_of_lerobot_are_set_points_of_servos() {
     }
 }
 
-/// A dataset's folder, or its description, of both layouts: episodes are pieces, joints go by name, and what LeRobot does
-/// not say is asked for.
+/// A dataset's folder, or its description, of both layouts: episodes are pieces, joints go by name, and what
+/// LeRobot does not say is asked for.
 #[test]
 fn datasets_of_lerobot_are_read_as_they_are() {
     let (csv, _) = read(&data("log.csv"), "");

@@ -1,4 +1,5 @@
-//! How much memory reading a log takes, against what its arrays take. Prints the figures of docs/logs.md with `--nocapture`.
+//! How much memory reading a log takes, against what its arrays take. Prints the figures of docs/logs.md with
+//! `--nocapture`.
 
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::panic)]
@@ -19,7 +20,8 @@ fn arm() -> dyngen::Arm {
     let joint = |k| {
         let turn = if k % 2 == 0 { "pi/2" } else { "-pi/2" };
         format!(
-            "[[joint]]\nkind = \"revolute\"\nname = \"arm_joint_{}\"\na = 0.3\nalpha = \"{turn}\"\nd = 0.1\ntheta = 0\n",
+            "[[joint]]\nkind = \"revolute\"\nname = \"arm_joint_{}\"\na = 0.3\nalpha = \"{turn}\"\nd = \
+            0.1\ntheta = 0\n",
             k + 1
         )
     };

@@ -1,4 +1,5 @@
-//! Mutated files of every format: read or refused, without a panic, soon, and within the memory that such a file may take.
+//! Mutated files of every format: read or refused, without a panic, soon, and within the memory that such a
+//! file may take.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 

@@ -90,7 +90,8 @@ fn a_dataset_of_lists_is_a_log_of_episodes() {
     assert_eq!((&plain.q[0], &plain.q[1]), (&csv.q[1], &csv.q[0]));
 }
 
-/// A file of MATLAB's that is torn or of a version with another format says so; no byte of it stops the program.
+/// A file of MATLAB's that is torn or of a version with another format says so; no byte of it stops the
+/// program.
 #[test]
 fn a_damaged_file_of_matlabs_is_reported() {
     for name in ["stored.mat", "packed.mat"] {

@@ -113,8 +113,8 @@ fn repeats_warm_and_joint_4_ripples(
         .filter(|(_, joint)| *joint == 4.0)
         .map(|(order, _)| order)
         .collect();
-    // Joint 4 is judged in a narrow band, since its ripple is larger than its model above; over so short a travel an
-    // order is known to 1 %. The second harmonic, 322, shows in wider bands only.
+    // Joint 4 is judged in a narrow band, since its ripple is larger than its model above; over so short a
+    // travel an order is known to 1 %. The second harmonic, 322, shows in wider bands only.
     assert!(of_joint_4.iter().any(|order| (order / 161.0 - 1.0).abs() <= 0.01), "{of_joint_4:?}");
     assert!(explained.false_positives.rate < 0.05);
     for change in &explained.held_out_change {
@@ -144,7 +144,8 @@ fn the_coupled_wrist_of_the_tx40_is_found_in_either_half() {
         let coupling = explained.effects.iter().find(|e| e.effect == "joint_coupling").unwrap();
         assert!(coupling.held_out_gain.iter().all(|gain| *gain == 0.0), "{:?}", coupling.held_out_gain);
         let figures = figures(coupling);
-        // By hand the motor that turns with both fits best, and the friction of either on the other nearly ties.
+        // By hand the motor that turns with both fits best, and the friction of either on the other nearly
+        // ties.
         if let Some(motor) = figures["transmissions"].get(0) {
             assert_eq!((motor["motor"].as_u64(), motor["with"].as_u64()), (Some(6), Some(5)), "{figures}");
             let ratio = motor["ratio"].as_f64().unwrap();
@@ -186,8 +187,8 @@ fn the_zeros_of_the_kinova_are_found_the_other_way_round_at_length() {
     the_zeros_of_the_kinova_are_found(&[1, 3, 5], &[2, 4]);
 }
 
-/// By their owners: 105 g on the housing of the insertion axis, which is link 2 and does not slide; its first moment about
-/// the remote centre is 0.056 kg·m. By hand, from the difference of the logs, 0.054.
+/// By their owners: 105 g on the housing of the insertion axis, which is link 2 and does not slide; its first
+/// moment about the remote centre is 0.056 kg·m. By hand, from the difference of the logs, 0.054.
 #[test]
 fn a_mass_on_the_second_link_of_the_dvrk_is_found_there() {
     // In one of two fitted logs, in the log that judges, and in the only log that is fitted.

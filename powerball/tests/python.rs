@@ -1,5 +1,5 @@
-//! python-canopen as master of the virtual arm, as slave of `powerball bus`, over UDP multicast and over slcan, and
-//! as the arm that `powerball record` moves.
+//! python-canopen as master of the virtual arm, as slave of `powerball bus`, over UDP multicast and over
+//! slcan, and as the arm that `powerball record` moves.
 //!
 //! `PYTHON` names the interpreter (python3 where it is not set). Where it lacks the packages the tests say so
 //! and pass, unless `REQUIRE_PYTHON` is set, as it is in `.ci/run`.

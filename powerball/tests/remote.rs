@@ -112,7 +112,8 @@ fn read(path: &str, map: &str) -> Result<Log, LogError> {
     Log::read_as(path, &arm(), &ColumnMap::parse(map, "map").unwrap()).map(|(log, _)| log)
 }
 
-/// Chunks of an arm, of a camera and of another topic with numbers; how many bytes the arm's have, with their indexes.
+/// Chunks of an arm, of a camera and of another topic with numbers; how many bytes the arm's have, with their
+/// indexes.
 fn recording() -> (Vec<u8>, u64) {
     let options = mcap::WriteOptions::new().compression(None).chunk_size(None);
     let mut writer = options.create(std::io::Cursor::new(Vec::new())).unwrap();

@@ -1,5 +1,5 @@
-//! What the process that holds an arm withstands, and what happens on the bus where it dies: hostile requests to its page,
-//! SIGKILL, an abort.
+//! What the process that holds an arm withstands, and what happens on the bus where it dies: hostile requests
+//! to its page, SIGKILL, an abort.
 
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::panic)]
@@ -74,7 +74,8 @@ fn exchange(at: SocketAddr, bytes: &[u8]) -> String {
     String::from_utf8_lossy(&answer).into_owned()
 }
 
-/// Everything that a page must not do is tried on the page of an arm that moves. The run is the one that nobody disturbs.
+/// Everything that a page must not do is tried on the page of an arm that moves. The run is the one that
+/// nobody disturbs.
 #[test]
 fn a_page_can_do_nothing_to_the_arm() {
     let folder = folder("hostile", 12.0);
@@ -240,8 +241,8 @@ fn current(frame: &Frame) -> bool {
     matches!(Cob::of(frame), Some(Cob::Rpdo(1, _))) && matches!(frame.bytes(), [0x0F, 0, _, _])
 }
 
-/// A run that has been in torque mode for a second. A machine with other work may leave it without time for its cycle: then
-/// the driver stops the arm, and it is tried again.
+/// A run that has been in torque mode for a second. A machine with other work may leave it without time for
+/// its cycle: then the driver stops the arm, and it is tried again.
 fn in_torque_mode(folder: &Path, url: &str, heard: &Receiver<(Instant, Frame)>) -> Ended {
     let mut why = String::new();
     for _ in 0..5 {

@@ -20,8 +20,8 @@ pub(crate) fn functions() -> Vec<(&'static str, Vec<&'static str>, &'static str,
     Function::ALL.into_iter().map(of).collect()
 }
 
-/// Runs over states of shape (n,) or (N, n). Vectors are (m,) or (N, m), matrices (r, c) or (N, r, c), numbers
-/// () or (N,).
+/// Runs over states of shape (n,) or (N, n). Vectors are (m,) or (N, m), matrices (r, c) or (N, r, c),
+/// numbers () or (N,).
 pub(crate) fn evaluate<'py>(
     py: Python<'py>,
     evaluator: &Evaluator,

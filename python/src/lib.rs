@@ -1,6 +1,8 @@
-//! The compiled part of the Python package `powerball`: what numpy needs of dyngen and powerball, as plain values.
+//! The compiled part of the Python package `powerball`: what numpy needs of dyngen and powerball, as plain
+//! values.
 //!
-//! Nothing is computed here. The package's own modules, in Python, give it the forms that users of numpy know.
+//! Nothing is computed here. The package's own modules, in Python, give it the forms that users of numpy
+//! know.
 
 mod arm;
 mod evaluate;

@@ -28,9 +28,9 @@ fn log(py: Python<'_>, what: &str) -> PyResult<()> {
     logger.call_method1("info", (what,)).map(drop)
 }
 
-/// Runs a computation on a thread of its own while this one calls `listener` with what is being done and looks
-/// for Ctrl-C. Where either raises, the exception is raised at once, and the computation ends when it next says
-/// what it does.
+/// Runs a computation on a thread of its own while this one calls `listener` with what is being done and
+/// looks for Ctrl-C. Where either raises, the exception is raised at once, and the computation ends when it
+/// next says what it does.
 pub(crate) fn run<T: Send + 'static>(
     py: Python<'_>,
     listener: Option<&Bound<'_, PyAny>>,

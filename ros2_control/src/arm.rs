@@ -12,7 +12,8 @@ use std::path::Path;
 /// The arm's joints.
 pub const JOINTS: usize = 6;
 
-/// For booting, configuring and verifying the drives, and for enabling them, µs: joints commutate one after the other.
+/// For booting, configuring and verifying the drives, and for enabling them, µs: joints commutate one after
+/// the other.
 const PATIENCE: u64 = 60_000_000;
 /// For the built-in arm's drives to boot, µs.
 const BOOT: u64 = 200_000;
@@ -28,8 +29,8 @@ pub struct State {
     pub effort: [f64; JOINTS],
 }
 
-/// An arm on its bus, in interpolated position mode. It has no thread of its own: time passes on the bus while one of
-/// its functions is called.
+/// An arm on its bus, in interpolated position mode. It has no thread of its own: time passes on the bus
+/// while one of its functions is called.
 #[derive(Debug)]
 pub struct Arm {
     master: Master<Box<dyn Bus>, JOINTS>,
@@ -82,13 +83,14 @@ impl Arm {
         Ok(())
     }
 
-    /// From the next [`Arm::configure`] on, drives whose device type or identity is another than the profile says are used.
+    /// From the next [`Arm::configure`] on, drives whose device type or identity is another than the profile
+    /// says are used.
     pub fn accept_other_drives(&mut self) {
         self.master.driver_mut().accept_other_nodes();
     }
 
-    /// Boots, identifies, configures and verifies all drives; nothing moves. SYNC runs from here on: [`Arm::read`] must be
-    /// called each cycle.
+    /// Boots, identifies, configures and verifies all drives; nothing moves. SYNC runs from here on:
+    /// [`Arm::read`] must be called each cycle.
     ///
     /// # Errors
     /// Why a drive is not as it must be.
@@ -160,8 +162,8 @@ impl Arm {
         self.master.stop().map_err(|e| e.to_string())
     }
 
-    /// After an error: waits until the arm stands, says why it was stopped, and acknowledges it. Nothing moves;
-    /// [`Arm::activate`] may follow where this gives true, [`Arm::configure`] where it gives false.
+    /// After an error: waits until the arm stands, says why it was stopped, and acknowledges it. Nothing
+    /// moves; [`Arm::activate`] may follow where this gives true, [`Arm::configure`] where it gives false.
     ///
     /// # Errors
     /// Where the arm does not come to rest.
@@ -250,8 +252,8 @@ mod tests {
         arm.deactivate().unwrap();
     }
 
-    /// A joint that the model says has no torque beyond a place stops before it; the built-in model holds nothing back
-    /// that the arm can do, and a mounting or a file that is none is reported.
+    /// A joint that the model says has no torque beyond a place stops before it; the built-in model holds
+    /// nothing back that the arm can do, and a mounting or a file that is none is reported.
     #[test]
     fn what_takes_more_torque_than_a_joint_has_does_not_leave() {
         let mut arm = Arm::open("virtual").unwrap();

@@ -1,6 +1,6 @@
-//! The driver behind a C ABI, for a hardware interface of ros2_control: `include/powerball.h` says what each function
-//! does, `docs/ros2_control.md` how it is used. [`Arm`] is the same in Rust. [`control`] has control laws for a controller
-//! of any arm.
+//! The driver behind a C ABI, for a hardware interface of ros2_control: `include/powerball.h` says what each
+//! function does, `docs/ros2_control.md` how it is used. [`Arm`] is the same in Rust. [`control`] has control
+//! laws for a controller of any arm.
 //!
 //! Everything here is unsafe in the one way that C is: a pointer is what its caller says it is.
 
@@ -14,9 +14,9 @@ use std::ffi::{CStr, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-/// It is done.
+/// The call is done.
 pub const OK: c_int = 0;
-/// It is not done; [`powerball_message`] says why.
+/// The call is not done; [`powerball_message`] says why.
 pub const ERROR: c_int = 1;
 /// After an error: the drives must be configured anew.
 pub const CONFIGURE: c_int = 2;
@@ -100,7 +100,8 @@ pub unsafe extern "C" fn powerball_close(handle: *mut Handle) {
     }
 }
 
-/// Inverse dynamics in the caller's language: context; position, velocity, acceleration; torque, N·m, to be written.
+/// Inverse dynamics in the caller's language: context; position, velocity, acceleration; torque, N·m, to be
+/// written.
 pub type InverseDynamics = unsafe extern "C" fn(*mut c_void, *const f64, *const f64, *const f64, *mut f64);
 
 /// A model that a caller gave, with what is his.
@@ -125,8 +126,8 @@ impl Callback {
 /// program ends.
 ///
 /// # Safety
-/// `handle` is null or an open arm's that nobody else uses now; `torque` is null or may be called with `context` until
-/// the arm is closed, reads and writes [`JOINTS`] numbers, and does not unwind.
+/// `handle` is null or an open arm's that nobody else uses now; `torque` is null or may be called with
+/// `context` until the arm is closed, reads and writes [`JOINTS`] numbers, and does not unwind.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn powerball_guard_torque(
     handle: *mut Handle,
@@ -162,7 +163,8 @@ pub unsafe extern "C" fn powerball_accept_unverified(handle: *mut Handle) -> c_i
 /// See [`Arm::guard_model`].
 ///
 /// # Safety
-/// `handle` is null or an open arm's that nobody else uses now; the others are null or texts that end with zero.
+/// `handle` is null or an open arm's that nobody else uses now; the others are null or texts that end with
+/// zero.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn powerball_guard_model(
     handle: *mut Handle,
@@ -251,7 +253,8 @@ pub unsafe extern "C" fn powerball_deactivate(handle: *mut Handle) -> c_int {
     unsafe { with(handle, |arm| arm.deactivate().map(|()| OK)) }
 }
 
-/// See [`Arm::on_error`]; [`OK`] where the arm may be activated again, [`CONFIGURE`] where it must be configured first.
+/// See [`Arm::on_error`]; [`OK`] where the arm may be activated again, [`CONFIGURE`] where it must be
+/// configured first.
 ///
 /// # Safety
 /// `handle` is null or an open arm's that nobody else uses now.

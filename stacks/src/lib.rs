@@ -1,5 +1,5 @@
-//! A node of zencan-node on powerball's bus in memory, and powerball's CANopen as its master: boot-up and heartbeat, SDO
-//! expedited and segmented, aborts, mapping of PDOs, SYNC, NMT.
+//! A node of zencan-node on powerball's bus in memory, and powerball's CANopen as its master: boot-up and
+//! heartbeat, SDO expedited and segmented, aborts, mapping of PDOs, SYNC, NMT.
 
 #![cfg(test)]
 
@@ -94,7 +94,8 @@ fn a_node_of_zencan_is_mastered() {
     let mut bus = Memory::new(Zencan { node, now: 0, out: VecDeque::new() }, 500_000);
 
     let heard = states(&hear(&mut bus, 350_000));
-    // zencan-node 0.0.5 boots without the boot-up message of CiA 301: its first heartbeat says pre-operational.
+    // zencan-node 0.0.5 boots without the boot-up message of CiA 301: its first heartbeat says
+    // pre-operational.
     assert!(heard.len() >= 4 && heard.iter().all(|s| *s == nmt::State::PreOperational), "{heard:?}");
 
     let read = |bus: &mut Memory<Zencan>, object| blocking::read(bus, NODE, object);

@@ -1,4 +1,5 @@
-//! The measured servo: a Feetech STS3215 on a pendulum. Each crate whose tests read its logs has this file as a module.
+//! The measured servo: a Feetech STS3215 on a pendulum. Each crate whose tests read its logs has this file as
+//! a module.
 
 use dyngen::{Arm, Values};
 use powerball_logs::log::ServoLog;
@@ -6,18 +7,19 @@ use std::path::PathBuf;
 use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Its paths.
+/// Paths of the set.
 pub(crate) const PATHS: [&str; 5] = ["brutal", "lift_and_drop", "sin_sin", "sin_time_square", "up_and_down"];
-/// Its masses, kg, with their names in files.
+/// Masses of the set, kg, with their names in files.
 pub(crate) const MASSES: [(&str, f64); 2] = [("0.535", 0.535), ("1.168", 1.1682)];
-/// Its lengths, m, and gains.
+/// Lengths of the set, m, and gains.
 pub(crate) const LENGTHS: [f64; 2] = [0.1, 0.15];
 pub(crate) const GAINS: [u32; 3] = [8, 16, 32];
 
 /// A pendulum of one link of a length, m, that hangs at q = 0.
 pub(crate) fn pendulum(length: f64, servo: &str) -> Arm {
     let text = format!(
-        "name = \"pendulum\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n[[joint]]\nkind = \"revolute\"\n\
+        "name = \"pendulum\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n[[joint]]\nkind = \
+        \"revolute\"\n\
          a = {length}\nalpha = 0\nd = 0\ntheta = \"-pi/2\"\n[joint.servo]\n{servo}"
     );
     Arm::parse(&text, "pendulum.toml").unwrap()
@@ -29,11 +31,12 @@ pub(crate) fn point(mass: f64) -> Values {
     Values::named(std::iter::once(("m1", mass)).chain(zero), "point")
 }
 
-/// Its logs, unpacked into a folder that goes with their last use.
+/// The set's logs, unpacked into a folder that goes with their last use.
 pub(crate) struct Measured(PathBuf);
 
 impl Measured {
-    /// `None`, and a line that says so, where they are not at hand. `POWERBALL_DATA` names the folder of all sets.
+    /// `None`, and a line that says so, where they are not at hand. `POWERBALL_DATA` names the folder of all
+    /// sets.
     pub(crate) fn unpack() -> Option<Measured> {
         let folder = std::env::var_os("POWERBALL_DATA").map_or_else(
             || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),

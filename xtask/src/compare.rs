@@ -163,7 +163,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
         }
         let (pairs, different, error) = share(&differ);
         println!(
-            "{}: different {different} of {pairs} pairs ({:.2} %, standard error {:.2} %), the right sentence {right}",
+            "{}: different {different} of {pairs} pairs ({:.2} %, standard error {:.2} %), the right \
+            sentence {right}",
             change.says(),
             100.0 * different as f64 / pairs as f64,
             100.0 * error
@@ -178,8 +179,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     Ok(())
 }
 
-/// Pairs, those that differ, and the standard error of their share: pairs of one fit depend on each other, so what varies
-/// is the share of each fit.
+/// Pairs, those that differ, and the standard error of their share: pairs of one fit depend on each other, so
+/// what varies is the share of each fit.
 fn share(differ: &[Vec<Option<bool>>]) -> (usize, usize, f64) {
     let all: Vec<bool> = differ.iter().flatten().copied().flatten().collect();
     let (pairs, different) = (all.len().max(1), all.iter().filter(|d| **d).count());

@@ -26,7 +26,8 @@ enum Command {
     Conventions(conventions::Arguments),
     /// How often `explain` gives the right name, where the truth is known
     Study(study::Arguments),
-    /// How often names with such evidence are right: fits the curve, and judges it on cases that were not fitted
+    /// How often names with such evidence are right: fits the curve, and judges it on cases that were not
+    /// fitted
     Probability(study::ProbabilityArguments),
     /// Logs with known truth as files, and the score of any program that explains them
     Benchmark(study::BenchmarkArguments),

@@ -109,8 +109,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
             figures and all, by\n\n```sh\ncargo run --release -p xtask -- stories\n```\n\n\
          Figures show means over equal numbers of samples (purple without the effect but with all others, \
          blue with it, orange what it adds), torques \
-         against the direction of motion where that is stated. [measured.md](../measured.md) has the results in \
-         short and describes the data, [explain.md](../explain.md) says what must be true \
+         against the direction of motion where that is stated. [measured.md](../measured.md) has the results \
+         in short and describes the data, [explain.md](../explain.md) says what must be true \
          before a name is given, and \
          [study.md](../study.md) how often a name is right where the truth is known.\n",
     );

@@ -1,7 +1,7 @@
 //! Whether names that some of the logs give are contradicted by more of them.
 //!
-//! Each log judges in turn. To three of the others the model is fitted, and to all of them: a name of the few logs is
-//! taken back where all logs together give it on none of its joints.
+//! Each log judges in turn. To three of the others the model is fitted, and to all of them: a name of the few
+//! logs is taken back where all logs together give it on none of its joints.
 
 use dyngen::Arm;
 use powerball::explanation::explain::NamedEffect;

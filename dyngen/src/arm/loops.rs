@@ -136,7 +136,8 @@ fn names(
         [_, _] => fail(v.span(), "of the chain must be neighbours, from the base outwards".to_string()),
         _ => fail(
             v.span(),
-            "has more than two of the chain: where the chain itself runs round the loop, give its joints mimic"
+            "has more than two of the chain: where the chain itself runs round the loop, give its joints \
+            mimic"
                 .to_string(),
         ),
     }
@@ -177,13 +178,14 @@ fn planar(joints: &[Joint], convention: Convention, found: &Loop) -> Option<Stri
     (found.first != found.last && found.sign(convention, joints).is_none()).then(|| {
         let (first, last) = (found.first + 1, found.last + 1);
         format!(
-            "is not planar: the axes of joints {first} and {last} are not parallel (alpha between them is not 0 \
-             or pi)"
+            "is not planar: the axes of joints {first} and {last} are not parallel (alpha between them is \
+             not 0 or pi)"
         )
     })
 }
 
-/// Lets one of a loop's two joints of the chain follow the other: the outer one, or the one that the file says.
+/// Lets one of a loop's two joints of the chain follow the other: the outer one, or the one that the file
+/// says.
 fn tie(joints: &mut [Joint], convention: Convention, found: &Loop) -> Result<(), String> {
     let (a, b) = (found.first, found.last);
     let Some(sign) = found.sign(convention, joints).filter(|_| a != b) else { return Ok(()) };
@@ -209,8 +211,8 @@ fn tie(joints: &mut [Joint], convention: Convention, found: &Loop) -> Result<(),
         return Ok(());
     }
     Err(format!(
-        "its parallelogram makes joint {} follow joint {}: ratio = {}, offset = {}; mimic says otherwise (it may be \
-         left out)",
+        "its parallelogram makes joint {} follow joint {}: ratio = {}, offset = {}; mimic says otherwise (it \
+         may be left out)",
         follower + 1,
         right.joint + 1,
         right.ratio,
@@ -263,8 +265,8 @@ impl Loop {
         let [first, second, third, fourth] = &self.lengths;
         if first != third || second != fourth {
             return Some(format!(
-                "lengths {}, {}, {}, {} are no parallelogram: only loops whose opposite bars are equal are supported \
-                 (the first and third, the second and fourth length)",
+                "lengths {}, {}, {}, {} are no parallelogram: only loops whose opposite bars are equal are \
+                 supported (the first and third, the second and fourth length)",
                 to_f64(first),
                 to_f64(second),
                 to_f64(third),
@@ -342,7 +344,8 @@ fn described(reader: &mut Reader<'_>, t: &Table<'_, '_>, mut bars: Vec<Bar>) -> 
     if tables.len() > bars.len() {
         let (span, count) = (tables[bars.len()].span.clone(), bars.len());
         let message = format!(
-            "{}: {} tables [[loop.bar]]: its bars that are no links of the chain are {count}, from the outer link on",
+            "{}: {} tables [[loop.bar]]: its bars that are no links of the chain are {count}, from the outer \
+            link on",
             t.place,
             tables.len()
         );

@@ -81,10 +81,10 @@ pub struct Joint {
     pub torque_constant: Option<f64>,
     /// The joint that it follows, where it does not move on its own.
     pub mimic: Option<Mimic>,
-    /// The frame in which a robot description has the link, in the frame of the table, where it is another: points of
-    /// the link are reported in it.
+    /// The frame in which a robot description has the link, in the frame of the table, where it is another:
+    /// points of the link are reported in it.
     pub link_frame: Option<Placement>,
-    /// Its drive, where that is a position servo.
+    /// The joint's drive, where that is a position servo.
     pub servo: Option<Servo>,
 }
 

@@ -97,7 +97,8 @@ fn other_kind(text: &str) -> Option<&'static str> {
         text.trim_start_matches('\u{feff}').lines().find(|line| !line.trim().is_empty())?.trim_start();
     if first.starts_with('<') {
         return Some(
-            "this is XML and no arm file: `dyngen import FILE -o arm.toml` makes one of a URDF or a MuJoCo model",
+            "this is XML and no arm file: `dyngen import FILE -o arm.toml` makes one of a URDF or a MuJoCo \
+            model",
         );
     }
     let separated = |by: char| first.matches(by).count() >= 2;
@@ -412,8 +413,8 @@ impl Reader<'_> {
         let name = name?;
         if !is_name(&name) {
             let message = format!(
-                "{place}: name '{name}' becomes a module's: take lowercase letters, digits and _, a letter first, and no word \
-                 of Rust or of the file's own"
+                "{place}: name '{name}' becomes a module's: take lowercase letters, digits and _, a letter \
+                 first, and no word of Rust or of the file's own"
             );
             self.errors.error(t.span.clone(), message);
             return None;

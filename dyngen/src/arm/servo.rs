@@ -4,8 +4,9 @@
 //!
 //! u = clamp(gain·(kp·e + ki·∫e dt − kd·q̇), ± pwm_limit), e = goal − q beyond the dead zone,
 //!
-//! and the motor's torque at the joint is τ = k/R·(u·supply − k·q̇), with `torque_constant` k and `resistance` R. The goal comes
-//! `delay` late and moves no faster than `speed_limit`. Nothing of it enters the arm's rigid dynamics.
+//! and the motor's torque at the joint is τ = k/R·(u·supply − k·q̇), with `torque_constant` k and
+//! `resistance` R. The goal comes `delay` late and moves no faster than `speed_limit`. Nothing of it enters
+//! the arm's rigid dynamics.
 
 use super::table::{Reader, Table, Value, describe};
 use crate::exact::rational;
@@ -47,7 +48,8 @@ impl Servo {
         Some(self.torque_constant? / self.resistance? * self.supply?)
     }
 
-    /// Torque that the turning motor itself takes away for each rad/s, k²/R, where both are known, N·m·s/rad or N·s/m.
+    /// Torque that the turning motor itself takes away for each rad/s, k²/R, where both are known, N·m·s/rad
+    /// or N·s/m.
     #[must_use]
     pub fn back_emf(&self) -> Option<f64> {
         Some(self.torque_constant?.powi(2) / self.resistance?)
@@ -119,7 +121,8 @@ fn number(r: &mut Reader<'_>, v: &Value<'_>, quantity: &str, unit: &str, range: 
 mod tests {
     use crate::Arm;
 
-    const JOINT: &str = "name = \"one\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n[[joint]]\nkind = \"revolute\"\n\
+    const JOINT: &str = "name = \"one\"\nconvention = \"standard\"\ngravity = [0, -9.81, \
+        0]\n[[joint]]\nkind = \"revolute\"\n\
                          a = 0.1\nalpha = 0\nd = 0\ntheta = 0\n";
 
     #[test]

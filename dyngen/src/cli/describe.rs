@@ -21,7 +21,8 @@ use std::process::ExitCode;
 pub(super) struct Args {
     /// The arm file.
     arm: PathBuf,
-    /// Parameter values, JSON, for which rounding is bounded; without them each parameter is within ±1 SI unit.
+    /// Parameter values, JSON, for which rounding is bounded; without them each parameter is within ±1 SI
+    /// unit.
     #[arg(long, value_name = "FILE.json")]
     values: Option<PathBuf>,
     /// Bound the rounding of code that is generated with --contract.
@@ -221,8 +222,8 @@ fn weak_sums(t: &mut String, weak: &[Weak]) {
     }
     let _ = writeln!(
         t,
-        "\nhardly identifiable, through residues of the file's numbers alone (an angle such as 1.5708, or axes \
-         that almost\nmeet), with the singular value of the scaled regressor:"
+        "\nhardly identifiable, through residues of the file's numbers alone (an angle such as 1.5708, or \
+         axes that almost\nmeet), with the singular value of the scaled regressor:"
     );
     for w in weak {
         let _ = writeln!(t, "  {:.1e}: sums of {}", w.singular_value, w.parameters.join(" "));
@@ -257,8 +258,8 @@ fn operation_table(t: &mut String, operations: &[(&'static str, Operations)]) {
 fn rounding_table(t: &mut String, arm: &Arm, rounding: &Rounding) {
     let _ = writeln!(
         t,
-        "\nrounding: |emitted − exact| of each function's worst entry, in its unit, for every state within the \
-         limits\n({}parameters: {}):",
+        "\nrounding: |emitted − exact| of each function's worst entry, in its unit, for every state within \
+         the limits\n({}parameters: {}):",
         if rounding.contracted { "code with --contract; " } else { "" },
         rounding.parameters.text()
     );

@@ -5,7 +5,8 @@ use dyngen::arm::{Angle, Parameter};
 use dyngen::exact::constant::{Constant, ConstantField};
 use dyngen::exact::rational;
 
-/// An exact coefficient of more characters is shown in six digits: 49/400 stays, 6863823083365249/1000000… not.
+/// An exact coefficient of more characters is shown in six digits: 49/400 stays, 6863823083365249/1000000…
+/// not.
 const SHORT: usize = 12;
 /// Of a relation that is text already.
 const LONGEST: usize = 160;

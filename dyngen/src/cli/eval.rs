@@ -9,8 +9,8 @@ use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = format!("{}\n\nExample: dyngen eval arm.toml --function inverse_dynamics --states states.csv \
-        --values values.json", generate::list_of_functions())
+    after_help = format!("{}\n\nExample: dyngen eval arm.toml --function inverse_dynamics --states \
+        states.csv --values values.json", generate::list_of_functions())
 )]
 pub(super) struct Args {
     /// The arm file.

@@ -14,8 +14,8 @@ pub(super) struct Args {
     file: PathBuf,
     /// The arm file that it was generated from.
     arm: PathBuf,
-    /// The values that must be baked into the file: a JSON file {"parameter": number, …}. Without it those that the
-    /// file itself names are taken.
+    /// The values that must be baked into the file: a JSON file {"parameter": number, …}. Without it those
+    /// that the file itself names are taken.
     #[arg(long, value_name = "FILE.json")]
     values: Option<PathBuf>,
     /// One JSON object on standard output.
@@ -53,7 +53,8 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     Ok(if report.difference.is_none() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
-/// The first line of a function that is not what dyngen writes, in Rust: no part of the proof, but where to look.
+/// The first line of a function that is not what dyngen writes, in Rust: no part of the proof, but where to
+/// look.
 fn written_otherwise(verifier: &Verifier, text: &str, function: &str) -> Option<usize> {
     let has = |f: &Function| text.contains(&format!("pub fn {f}_with<"));
     let options = Options {

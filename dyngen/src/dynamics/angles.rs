@@ -1,9 +1,9 @@
 //! The angles of an arm, decided once: the sums of joints' angles whose sine and cosine functions use, and
 //! how each is made of the coordinates.
 //!
-//! A joint's angle is its ratio times the coordinate that it moves with and a constant. Functions take the angles of
-//! the joints that move on their own, of those that follow them, and sums across parallel axes, where only sums
-//! matter. Quarter turns are in no angle: they swap sine and cosine and change signs.
+//! A joint's angle is its ratio times the coordinate that it moves with and a constant. Functions take the
+//! angles of the joints that move on their own, of those that follow them, and sums across parallel axes,
+//! where only sums matter. Quarter turns are in no angle: they swap sine and cosine and change signs.
 
 use super::chain;
 use crate::arm::{Arm, JointKind};
@@ -72,8 +72,8 @@ impl Angles {
         angles
     }
 
-    /// Every sum whose sine and cosine functions may take: the joints that move on their own, in the order of the
-    /// coordinates and whether they turn or slide, then the others.
+    /// Every sum whose sine and cosine functions may take: the joints that move on their own, in the order of
+    /// the coordinates and whether they turn or slide, then the others.
     pub fn taken(&self) -> &[JointSum] {
         &self.taken
     }
@@ -106,7 +106,8 @@ impl Angles {
         self.joints.iter().filter_map(|joint| joint.ratio).fold(1.0, |most, ratio| most.max(ratio.abs()))
     }
 
-    /// Sine and cosine of Σ ±(q + theta) over joints of the chain (`true`: minus), each as if it moved on its own.
+    /// Sine and cosine of Σ ±(q + theta) over joints of the chain (`true`: minus), each as if it moved on its
+    /// own.
     pub fn of_chain(&self, b: &Builder, joints: &[(usize, bool)]) -> (Expr, Expr) {
         let (sum, negative) = JointSum::of(joints.iter().copied());
         let turns = |(joint, negative): &(usize, bool)| match (self.joints[*joint].quarters, negative) {

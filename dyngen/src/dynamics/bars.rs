@@ -2,8 +2,8 @@
 //!
 //! A bar's origin is a point of one link, and it turns with another. So its force acts on the one link at the
 //! pin, and its moment on the other: v·f + ω·n is its power, whatever moves. The forces in its pins never
-//! appear. With these two wrenches the recursion gives the torques of bars; the matrices follow from it column
-//! by column.
+//! appear. With these two wrenches the recursion gives the torques of bars; the matrices follow from it
+//! column by column.
 
 use super::body::{Vector, ZERO};
 use super::chain::LinkGeometry;

@@ -403,7 +403,8 @@ impl<'a> Parts<'a> {
         pose::Ends { base: placed(&arm.base), tool: placed(&arm.tool), carrier: arm.tool_carrier() }
     }
 
-    /// J̇·q̇: the tool's acceleration without q̈, from the recursion along a chain whose last link has axes of its own.
+    /// J̇·q̇: the tool's acceleration without q̈, from the recursion along a chain whose last link has axes
+    /// of its own.
     fn jacobian_rate_times_velocity(&self) -> Vec<Expr> {
         let Subject { arm, angles, .. } = self.subject;
         let drive = self.drive(self.at_rest(), false);
@@ -428,7 +429,8 @@ impl<'a> Parts<'a> {
         self.derivatives(&self.torque(self.each(Input::Acceleration), true), direction)
     }
 
-    /// −B⁻¹·∂τ/∂q or −B⁻¹·∂τ/∂q̇ at the accelerations that the torques make (Carpentier and Mansard 2018), n × n.
+    /// −B⁻¹·∂τ/∂q or −B⁻¹·∂τ/∂q̇ at the accelerations that the torques make (Carpentier and Mansard 2018), n
+    /// × n.
     fn acceleration_derivatives(&self, direction: fn(usize) -> Direction) -> Vec<Expr> {
         let (b, n) = (self.b, self.subject.arm.dof());
         let accelerations = self.followers.of_chain(b, &self.forward_dynamics());
@@ -503,7 +505,8 @@ impl<'a> Parts<'a> {
         (0..self.subject.arm.dof()).flat_map(|i| columns.iter().map(move |c| c[i])).collect()
     }
 
-    /// The gradient of eᵀτ backwards, then its change in the direction forwards (Griewank and Walther 2008, §5), n × 2.
+    /// The gradient of eᵀτ backwards, then its change in the direction forwards (Griewank and Walther 2008,
+    /// §5), n × 2.
     fn torque_hessian_times(&self) -> Vec<Expr> {
         let (b, n) = (self.b, self.subject.arm.dof());
         let of_each = |input: fn(usize) -> Input| (0..n).map(|i| b.input(input(i))).collect::<Vec<Expr>>();

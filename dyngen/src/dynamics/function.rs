@@ -189,8 +189,8 @@ impl Argument {
                 "force, N, above the moment about the origin, N·m, on the tool's frame, in base axes"
             }
             Argument::Payload => {
-                "m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz of a body on the tool's frame, in its axes and about its \
-                 origin: kg, kg·m, kg·m²"
+                "m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz of a body on the tool's frame, in its axes and \
+                 about its origin: kg, kg·m, kg·m²"
             }
             Argument::PositionDirection => "a direction in which q changes, one number for each joint",
             Argument::VelocityDirection => "a direction in which q̇ changes, one number for each joint",

@@ -7,7 +7,8 @@ use crate::exact::rational;
 use crate::graph::{Builder, Expr, Input};
 use crate::lagrangian::elements::PlacementElements;
 
-/// The payload of a function's inputs, in the axes and about the origin of the frame of the link that carries the tool.
+/// The payload of a function's inputs, in the axes and about the origin of the frame of the link that carries
+/// the tool.
 pub(super) fn given(b: &Builder, link: &LinkGeometry<Expr>, tool: &PlacementElements<Expr>) -> Moments<Expr> {
     body(b, link, tool, &std::array::from_fn(|i| b.input(Input::Payload(i))))
 }

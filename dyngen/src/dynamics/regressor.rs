@@ -29,7 +29,8 @@ struct LinkView {
     motion: LinkMotion,
     /// The coordinates up to the link's own, in its axes.
     axes: Vec<Axis>,
-    /// The way of a force back to the link whose end is this link's origin, and the velocities of that end there.
+    /// The way of a force back to the link whose end is this link's origin, and the velocities of that end
+    /// there.
     home: Option<(Vec<Turn>, Vec<Vector>)>,
 }
 
@@ -62,8 +63,8 @@ pub struct Columns<'a> {
     pub forces_home: bool,
 }
 
-/// Y(q, q̇, q̈), row-major n × p: τ = Y·π for the parameters of a set; with reference velocities the regressor of
-/// Slotine and Li, Y(q, q̇, q̇ᵣ, q̈ᵣ)·π = B·q̈ᵣ + C·q̇ᵣ + g.
+/// Y(q, q̇, q̈), row-major n × p: τ = Y·π for the parameters of a set; with reference velocities the
+/// regressor of Slotine and Li, Y(q, q̇, q̇ᵣ, q̈ᵣ)·π = B·q̈ᵣ + C·q̇ᵣ + g.
 pub fn regressor(b: &Builder, chain: &Chain, columns: &Columns<'_>, drive: &Drive) -> Vec<Expr> {
     let (n, p) = (chain.dof(), columns.set.parameters.len());
     let motions = motions(b, chain, drive);
@@ -149,8 +150,8 @@ fn views(b: &Builder, chain: &Chain, motions: &[StageMotion]) -> (Vec<LinkView>,
     (views, before_stages)
 }
 
-/// The axes of earlier coordinates in a member's own axes. From link to link only their linear parts grow: their
-/// angular parts stay those from before the stage, where members of the stage have none.
+/// The axes of earlier coordinates in a member's own axes. From link to link only their linear parts grow:
+/// their angular parts stay those from before the stage, where members of the stage have none.
 fn seen_from(b: &Builder, member: &Member, seen: &[Axis], link_to_link: Option<&Vec<Axis>>) -> Vec<Axis> {
     let turn_z = |(s, c): SinCos, v: &Vector| crate::lagrangian::elements::turn_z(b, &s, &c, v);
     let Some(before) = link_to_link else {

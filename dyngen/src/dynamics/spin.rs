@@ -84,8 +84,8 @@ impl Spin {
         }
     }
 
-    /// The motion of a frame that turns about this one's z by an angle with the given sine and cosine, velocity,
-    /// reference velocity and acceleration.
+    /// The motion of a frame that turns about this one's z by an angle with the given sine and cosine,
+    /// velocity, reference velocity and acceleration.
     ///
     /// Points of the axis move alike in both frames, so U's column along z is the same vector. What else U
     /// holds follows from it, from ω, and from the angular acceleration about z.

@@ -266,8 +266,8 @@ pub(super) const TABLE: [Row; COUNT] = [
         size: (Joints, Joints),
         arguments: &[Positions, Velocities, Torques, Parameters],
         kind: Kind::Dynamics,
-        what: "∂q̈/∂q of the forward dynamics at given torques: −B⁻¹·∂τ/∂q. With ∂q̈/∂τ = B⁻¹ it is the linearisation \
-            of the arm.",
+        what: "∂q̈/∂q of the forward dynamics at given torques: −B⁻¹·∂τ/∂q. With ∂q̈/∂τ = B⁻¹ it is the \
+            linearisation of the arm.",
         returns: "Returns n × n; column j is the derivative by q of joint j.",
     },
     Row {
@@ -337,8 +337,8 @@ pub(super) const TABLE: [Row; COUNT] = [
         size: (Fixed(6), Fixed(6)),
         arguments: &[Positions, Parameters],
         kind: Kind::Dynamics,
-        what: "Inverse of the inertia that a wrench on the tool's frame feels: Λ⁻¹ = J·B⁻¹·Jᵀ (Khatib 1987), in base \
-            axes.",
+        what: "Inverse of the inertia that a wrench on the tool's frame feels: Λ⁻¹ = J·B⁻¹·Jᵀ (Khatib 1987), \
+            in base axes.",
         returns: "Returns Λ⁻¹, 6 × 6, symmetric; not finite where the parameters make B singular.",
     },
     Row {
@@ -358,8 +358,8 @@ pub(super) const TABLE: [Row; COUNT] = [
         size: (Joints, Fixed(6)),
         arguments: &[Positions, Parameters],
         kind: Kind::Dynamics,
-        what: "Dynamically consistent inverse of the Jacobian, J̄ = B⁻¹·Jᵀ·Λ (Khatib 1987): torques of the null space \
-            (I − JᵀJ̄ᵀ)·τ do not accelerate the tool's frame.",
+        what: "Dynamically consistent inverse of the Jacobian, J̄ = B⁻¹·Jᵀ·Λ (Khatib 1987): torques of the \
+            null space (I − JᵀJ̄ᵀ)·τ do not accelerate the tool's frame.",
         returns: "Returns J̄, n × 6; not finite where the Jacobian loses rank.",
     },
     Row {
@@ -370,7 +370,8 @@ pub(super) const TABLE: [Row; COUNT] = [
         arguments: &[Positions],
         kind: Kind::Other,
         what: "Jacobian of the tool's frame in its own axes.",
-        returns: "Returns 6 × n: velocity of the origin, m/s, above the angular velocity, rad/s, in the frame's axes.",
+        returns: "Returns 6 × n: velocity of the origin, m/s, above the angular velocity, rad/s, in the \
+            frame's axes.",
     },
     Row {
         function: SpatialJacobian,
@@ -379,9 +380,10 @@ pub(super) const TABLE: [Row; COUNT] = [
         size: (Fixed(6), Joints),
         arguments: &[Positions],
         kind: Kind::Other,
-        what: "Jacobian of the tool's link about the base's origin, in base axes (Murray, Li and Sastry 1994).",
-        returns: "Returns 6 × n: velocity of the link's point that is at the base's origin, m/s, above the angular \
-            velocity, rad/s.",
+        what: "Jacobian of the tool's link about the base's origin, in base axes (Murray, Li and Sastry \
+            1994).",
+        returns: "Returns 6 × n: velocity of the link's point that is at the base's origin, m/s, above the \
+            angular velocity, rad/s.",
     },
     Row {
         function: Twist,
@@ -401,7 +403,8 @@ pub(super) const TABLE: [Row; COUNT] = [
         arguments: &[Positions, Velocities, Accelerations],
         kind: Kind::Other,
         what: "Acceleration of the tool's frame, J(q)·q̈ + J̇(q, q̇)·q̇, in base axes.",
-        returns: "Returns six numbers: acceleration of the origin, m/s², above the angular acceleration, rad/s².",
+        returns: "Returns six numbers: acceleration of the origin, m/s², above the angular acceleration, \
+            rad/s².",
     },
     Row {
         function: InverseDynamicsWithPayload,
@@ -421,7 +424,8 @@ pub(super) const TABLE: [Row; COUNT] = [
         arguments: &[Positions, Velocities, Accelerations],
         kind: Kind::Regressor,
         what: "Regressor of a payload on the tool's frame: τ with it is τ without it + Y·payload.",
-        returns: "Returns Y, n × 10, for m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz in the tool's axes, about its origin.",
+        returns: "Returns Y, n × 10, for m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz in the tool's axes, \
+            about its origin.",
     },
     Row {
         function: MassMatrixWithPayload,
@@ -478,8 +482,8 @@ pub(super) const TABLE: [Row; COUNT] = [
             Parameters,
         ],
         kind: Kind::Dynamics,
-        what: "The Hessian of eᵀ·τ(q, q̇, q̈) by (q, q̇) times the direction (vq, vdq). The mixed derivative by q̈ and q is \
-            that of B·e, `mass_matrix_times_by_position`.",
+        what: "The Hessian of eᵀ·τ(q, q̇, q̈) by (q, q̇) times the direction (vq, vdq). The mixed derivative \
+            by q̈ and q is that of B·e, `mass_matrix_times_by_position`.",
         returns: "Returns n × 2: the part of q, then that of q̇.",
     },
     Row {
@@ -509,7 +513,8 @@ pub(super) const TABLE: [Row; COUNT] = [
         size: (Fixed(6), Fixed(1)),
         arguments: &[Positions, Velocities, Parameters],
         kind: Kind::Other,
-        what: "Momentum of the whole arm with its rotors: linear, above angular about the base's origin, in base axes.",
+        what: "Momentum of the whole arm with its rotors: linear, above angular about the base's origin, in \
+            base axes.",
         returns: "Returns six numbers, kg·m/s and kg·m²/s.",
     },
     Row {
@@ -519,8 +524,8 @@ pub(super) const TABLE: [Row; COUNT] = [
         size: (Fixed(6), Joints),
         arguments: &[Positions, Parameters],
         kind: Kind::Other,
-        what: "Matrix of the momentum of the whole arm: momentum = A(q)·q̇ (Orin, Goswami and Lee 2013, there about \
-            the centre of mass).",
+        what: "Matrix of the momentum of the whole arm: momentum = A(q)·q̇ (Orin, Goswami and Lee 2013, \
+            there about the centre of mass).",
         returns: "Returns A, 6 × n.",
     },
 ];

@@ -1,7 +1,7 @@
 //! The whole arm as one body: its centre of mass and its momentum, which depend on every parameter.
 //!
-//! Bodies are those of the arm file, not the sums that torques depend on: moving mass from one link to the next keeps the
-//! torques but not the momentum.
+//! Bodies are those of the arm file, not the sums that torques depend on: moving mass from one link to the
+//! next keeps the torques but not the momentum.
 
 use super::body::ZERO;
 use super::composite::unit_momentum;
@@ -25,8 +25,8 @@ pub(super) struct Total {
 }
 
 impl Total {
-    /// From the values of the arm's parameters; `coupled` gives how fast a motor turns with each joint where its
-    /// transmission has several.
+    /// From the values of the arm's parameters; `coupled` gives how fast a motor turns with each joint where
+    /// its transmission has several.
     pub(super) fn build(
         b: &Builder,
         arm: &ArmElements<Expr>,
@@ -134,8 +134,8 @@ fn of_bar(b: &Builder, arm: &ArmElements<Expr>, bar: &BarElements<Expr>, body: &
     ]
 }
 
-/// A bar's momentum for a unit of a joint's velocity: m·v + ω×h at the pin on the link that carries it, I·ω + h×v on the
-/// link that it turns with, each about that link's origin and in its axes.
+/// A bar's momentum for a unit of a joint's velocity: m·v + ω×h at the pin on the link that carries it, I·ω +
+/// h×v on the link that it turns with, each about that link's origin and in its axes.
 fn unit_momenta(
     b: &Builder,
     arm: &ArmElements<Expr>,

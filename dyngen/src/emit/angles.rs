@@ -151,8 +151,8 @@ pub(super) struct Term {
     pub(super) coordinate: usize,
 }
 
-/// An angle as a sum of terms, in the order in which they are added, and what is added behind them where it is not
-/// zero.
+/// An angle as a sum of terms, in the order in which they are added, and what is added behind them where it
+/// is not zero.
 pub(super) fn terms(angles: &Angles, sum: JointSum) -> (Vec<Term>, Option<f64>) {
     let term = |(joint, negative)| {
         let JointAngle { coordinate, ratio, .. } = *angles.joint(joint);

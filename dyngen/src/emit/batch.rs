@@ -46,8 +46,8 @@ pub(super) fn module(model: &Model, functions: &[FunctionGraph]) -> TokenStream 
     }
 }
 
-/// A function over blocks: a loop of samples without a branch, and behind it the samples one by one where an angle is
-/// too large for that.
+/// A function over blocks: a loop of samples without a branch, and behind it the samples one by one where an
+/// angle is too large for that.
 fn function(model: &Model, built: &FunctionGraph) -> TokenStream {
     let name = Ident::new(built.function.name(), Span::call_site());
     let doc = docs::lines(&format!("[`{name}`](super::{name}) of `LANES` samples."));

@@ -1,4 +1,5 @@
-//! Functions of a generated file for callers in C and C++: `extern "C"` functions over pointers, and their header.
+//! Functions of a generated file for callers in C and C++: `extern "C"` functions over pointers, and their
+//! header.
 //!
 //! Nothing is computed here: each calls the function in Rust next to it.
 
@@ -28,7 +29,8 @@ pub struct CFunction {
     pub inputs: Vec<CArray>,
     /// What it writes.
     pub output: CArray,
-    /// The result as an array of `output.length` numbers, in Rust, with the inputs as `SVector`s of their names.
+    /// The result as an array of `output.length` numbers, in Rust, with the inputs as `SVector`s of their
+    /// names.
     pub result: String,
 }
 
@@ -42,8 +44,8 @@ pub struct CApi {
 }
 
 impl CFunction {
-    /// A function of a generated file with values baked in, for n joints and p parameters; `path` leads to the file's
-    /// module.
+    /// A function of a generated file with values baked in, for n joints and p parameters; `path` leads to
+    /// the file's module.
     #[must_use]
     pub fn of(function: Function, path: &str, n: usize, p: usize) -> CFunction {
         let name = function.name();
@@ -84,8 +86,8 @@ pub fn checked_prefix(name: &str) -> Result<&str, String> {
         return Ok(name);
     }
     Err(format!(
-        "'{name}' cannot be the beginning of names in C, as a header's name is: take letters, digits and _, a \
-         lowercase letter first"
+        "'{name}' cannot be the beginning of names in C, as a header's name is: take letters, digits and _, \
+         a lowercase letter first"
     ))
 }
 
@@ -174,8 +176,8 @@ fn function(prefix: &str, f: &CFunction) -> String {
     )
 }
 
-/// The C API: `first` stands before the functions in the module and in the header, `scalar` is f32 or f64, and
-/// `about` says in the header what all of it is.
+/// The C API: `first` stands before the functions in the module and in the header, `scalar` is f32 or f64,
+/// and `about` says in the header what all of it is.
 #[must_use]
 pub fn api(
     prefix: &str,
@@ -197,12 +199,12 @@ fn module(prefix: &str, first: &str, functions: &[CFunction]) -> String {
     let functions: String = functions.iter().map(|f| function(prefix, f)).collect();
     format!(
         "
-/// The same for callers in C: `{prefix}.h` says what each function does.
+/// The API for callers in C: `{prefix}.h` says what each function does.
 #[allow(unsafe_code)]
 pub mod c {{
     use super::*;
 
-    /// It is done.
+    /// The call is done.
     const OK: i32 = 0;
     /// A pointer is null: nothing was written.
     const NULL: i32 = 1;
@@ -251,7 +253,8 @@ extern \"C\" {{
 #define {guard}_JOINTS {joints}
 typedef {real} {prefix}_real;
 
-/* What every function gives: done; a pointer is null; the model was not begun. In the last two cases nothing was
+/* What every function gives: done; a pointer is null; the model was not begun. In the last two cases \
+nothing was
  * written. */
 #define {guard}_OK 0
 #define {guard}_NULL 1

@@ -97,8 +97,8 @@ fn rates(signature: &TokenStream, passed: &TokenStream) -> TokenStream {
 /// Euler's symplectic step.
 fn semi_implicit(signature: &TokenStream, passed: &TokenStream) -> TokenStream {
     quote! {
-        /// A step of the semi-implicit Euler method: q̇⁺ = q̇ + dt·q̈, q⁺ = q + dt·q̇⁺; `dt` in s. Its error is of second
-        /// order in a step.
+        /// A step of the semi-implicit Euler method: q̇⁺ = q̇ + dt·q̈, q⁺ = q + dt·q̇⁺; `dt` in s. Its error
+        /// is of second order in a step.
         #[must_use]
         pub fn semi_implicit<T: SimdRealField + Copy>(
             x: &State<T>,

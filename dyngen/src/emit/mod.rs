@@ -70,8 +70,8 @@ impl Default for Options {
 }
 
 impl Options {
-    /// The model that the wished functions need. Where all of them are kinematic no parameter set is derived, and
-    /// the set of the file is `full`.
+    /// The model that the wished functions need. Where all of them are kinematic no parameter set is derived,
+    /// and the set of the file is `full`.
     ///
     /// # Errors
     /// As [`Model::derive`].
@@ -191,8 +191,8 @@ fn items(model: &Model, options: &Options, parts: &Parts<'_>) -> Result<TokenStr
     }))
 }
 
-/// The items with leave to be of no use: nobody calls all functions of a file, and a file that is included may have no
-/// such attribute of its own.
+/// The items with leave to be of no use: nobody calls all functions of a file, and a file that is included
+/// may have no such attribute of its own.
 fn allowed_unused(tokens: TokenStream) -> TokenStream {
     let Ok(mut file) = syn::parse2::<syn::File>(tokens.clone()) else { return tokens };
     for item in &mut file.items {
@@ -252,7 +252,8 @@ fn frames(
     model.arm().frames.iter().map(&mut of).collect()
 }
 
-/// The module of a frame: the tool's functions at the frame, which share the file's angles and prepared parameters.
+/// The module of a frame: the tool's functions at the frame, which share the file's angles and prepared
+/// parameters.
 fn frame_module(
     model: &Model,
     options: &Options,

@@ -63,7 +63,8 @@ impl Form {
     }
 }
 
-/// The statement of a node; none for an input, which is named before, and for a product that is formed within a sum.
+/// The statement of a node; none for an input, which is named before, and for a product that is formed within
+/// a sum.
 pub(super) fn value(model: &Model, graph: &Graph, node: usize, form: &Form) -> Option<Value> {
     let Form { signs, contraction } = form;
     let name = |node: usize| value_name(graph, node);

@@ -40,9 +40,9 @@ pub struct ConstantField {
 }
 
 impl ConstantField {
-    /// The field of the first `members` of an arm's angle symbols; `draws` gives general angles their values modulo
-    /// the prime. The others, those of frames that no torque depends on, have such a value only: an arm may have
-    /// dozens of them, and a ring has room for [`VARIABLES`](super::polynomial::VARIABLES).
+    /// The field of the first `members` of an arm's angle symbols; `draws` gives general angles their values
+    /// modulo the prime. The others, those of frames that no torque depends on, have such a value only: an
+    /// arm may have dozens of them, and a ring has room for [`VARIABLES`](super::polynomial::VARIABLES).
     pub fn new(angles: &AngleSymbols, members: usize, draws: &mut Draws) -> Self {
         let residues: Vec<_> = (0..angles.angles.len()).map(|index| angles.modular(index, draws)).collect();
         let mut squares = Vec::new();

@@ -89,8 +89,8 @@ pub(super) fn motors(kind: JointKind, friction: Option<Friction>, terms: &[&Term
                     all.motors.push(Motor {
                         attributes: lugre(coulomb / bristles, coulomb, coulomb + c, *velocity),
                         words: format!(
-                            "{effect}: in place of frictionloss, {} + {} exp(-(v/{})^2) in steady sliding; not from \
-                             a log: that bristles of {} hold it at rest",
+                            "{effect}: in place of frictionloss, {} + {} exp(-(v/{})^2) in steady sliding; \
+                             not from a log: that bristles of {} hold it at rest",
                             shortest(coulomb),
                             with_error(&[term]),
                             shortest(*velocity),
@@ -145,8 +145,8 @@ fn with_error(terms: &[&Term]) -> String {
     }
 }
 
-/// σ0, σ1 = 0, Coulomb's and static level, Stribeck's velocity. Without σ1 nothing is added to steady sliding, and with
-/// equal levels this is Dahl's model.
+/// σ0, σ1 = 0, Coulomb's and static level, Stribeck's velocity. Without σ1 nothing is added to steady
+/// sliding, and with equal levels this is Dahl's model.
 fn lugre(stiffness: f64, coulomb: f64, breakaway: f64, velocity: f64) -> String {
     let numbers = [stiffness, 0.0, coulomb, breakaway, velocity].map(shortest);
     format!("gear=\"1\" lugre=\"{}\"", numbers.join(" "))
@@ -159,7 +159,8 @@ fn cogging(effect: &str, order: f64, terms: &[&Term]) -> Motor {
     let [sine, cosine] = [&sines, &cosines].map(|all| all.iter().map(|term| term.coefficient).sum::<f64>());
     let amplitude = f64::hypot(cosine, sine);
     let phase = if sine == 0.0 { -FRAC_PI_2.copysign(cosine) } else { f64::atan2(-cosine, -sine) };
-    // The number of poles is an integer. What turns k times as fast with one pole has k times its torque at the joint.
+    // The number of poles is an integer. What turns k times as fast with one pole has k times its torque at
+    // the joint.
     let whole = order.fract() == 0.0;
     let (gear, poles, amplitude) =
         if whole { (1.0, order, amplitude) } else { (order, 1.0, amplitude / order) };

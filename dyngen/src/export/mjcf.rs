@@ -1,5 +1,5 @@
-//! Identified values in a copy of a MuJoCo model: inertials, damping, frictionloss, armature, springs and ranges;
-//! every other byte stays.
+//! Identified values in a copy of a MuJoCo model: inertials, damping, frictionloss, armature, springs and
+//! ranges; every other byte stays.
 
 use super::body::Body;
 use super::dcmotor::{self, Motor, Motors, Spring};
@@ -58,8 +58,8 @@ pub fn mjcf(
                 joints.iter().for_each(|(name, _)| writer.name_joint(name));
                 let tendon = format!("{OURS}motor {}", joint.name);
                 notes.push(format!(
-                    "joint '{}': its motor turns with several joints: friction and rotor are on the tendon '{tendon}', \
-                     whose length is the motor's position",
+                    "joint '{}': its motor turns with several joints: friction and rotor are on the tendon \
+                     '{tendon}', whose length is the motor's position",
                     joint.name
                 ));
                 tendons.extend(tendon_lines(&tendon, &joints, &held));
@@ -141,7 +141,8 @@ struct Placed {
     motor: Motor,
 }
 
-/// The fixed tendon of a motor, whose length is the motor's position: the sum of joint positions times factors.
+/// The fixed tendon of a motor, whose length is the motor's position: the sum of joint positions times
+/// factors.
 fn tendon_lines(name: &str, joints: &[(&str, f64)], held: &Held) -> Vec<String> {
     let mut words = vec!["dyngen: a motor that turns with several joints".to_string()];
     let mut attributes = format!("name=\"{}\"", escaped(name));

@@ -12,8 +12,8 @@ use std::fmt::Write;
 /// The version of the format; joints that follow others need a later one.
 const VERSIONS: [&str; 2] = ["1.9", "1.11"];
 
-/// An arm with what is known of it as an SDF model that stands fixed in its world: inertias, friction, damping,
-/// limits.
+/// An arm with what is known of it as an SDF model that stands fixed in its world: inertias, friction,
+/// damping, limits.
 ///
 /// The frame of each link is on its joint's axis, z along it. `by` says in the first line what wrote the
 /// file; `more` are the caller's own notes, which stand in the file too.

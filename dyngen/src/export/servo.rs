@@ -44,8 +44,8 @@ pub(super) fn read(arm: &Arm, json: &Value) -> Result<Option<Vec<Option<Servo>>>
 fn servo(joint: usize, entry: &Value) -> Result<Servo, String> {
     if entry["absolute"] != Value::Bool(true) {
         return Err(format!(
-            "the torques of joint {} are shares of the torque at full duty: identify it with the arm's masses \
-             (--values), or with torque_constant, resistance and supply in the arm file",
+            "the torques of joint {} are shares of the torque at full duty: identify it with the arm's \
+             masses (--values), or with torque_constant, resistance and supply in the arm file",
             joint + 1
         ));
     }

@@ -121,8 +121,8 @@ fn notes(arm: &Arm, known: &Known, links: &[Link<'_>]) -> Vec<String> {
     }
     if links.iter().any(|link| link.friction.is_some_and(|f| f.coulomb != 0.0)) {
         notes.push(
-            "friction: the steps of tanh are one step of Coulomb friction of their sum (γ1 + γ3): how it rises \
-             near standstill is left out"
+            "friction: the steps of tanh are one step of Coulomb friction of their sum (γ1 + γ3): how it \
+             rises near standstill is left out"
                 .to_string(),
         );
     }
@@ -151,9 +151,11 @@ pub(super) mod tests {
         let text = format!(
             "name = \"three\"\nconvention = \"{convention}\"\ngravity = [0.0, 0.0, -9.81]\n\
              [base]\nxyz = [0.1, 0.2, 0.3]\nrpy = [\"pi/2\", 0, 0.3]\n\
-             [[joint]]\nkind = \"revolute\"\na = 0.3\nalpha = \"pi/2\"\nd = 0.1\ntheta = 0.4\nname = \"shoulder\"\n\
+             [[joint]]\nkind = \"revolute\"\na = 0.3\nalpha = \"pi/2\"\nd = 0.1\ntheta = 0.4\nname = \
+             \"shoulder\"\n\
              rotor_ratio = 100\nposition = [-2.5, 2.0]\nvelocity = 3.0\ntorque = 50.0\n\
-             [[joint]]\nkind = \"prismatic\"\na = 0.05\nalpha = -0.7\nd = 0.2\ntheta = \"pi/3\"\nname = \"slide\"\n\
+             [[joint]]\nkind = \"prismatic\"\na = 0.05\nalpha = -0.7\nd = 0.2\ntheta = \"pi/3\"\nname = \
+             \"slide\"\n\
              position = [0.0, 0.4]\n\
              [[joint]]\nkind = \"revolute\"\na = 0.2\nalpha = 0.9\nd = -0.1\ntheta = 0\nname = \"wrist\"\n\
              [tool]\nxyz = [0, 0, 0.1]\nrpy = [0, 0, 0]\n"

@@ -8,8 +8,8 @@ use crate::import::pose::Pose;
 use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion, Vector3};
 use std::fmt::Write;
 
-/// An arm with what is known of it as a stage (.usda): an articulation that stands fixed, masses and inertias,
-/// limits, friction and armature.
+/// An arm with what is known of it as a stage (.usda): an articulation that stands fixed, masses and
+/// inertias, limits, friction and armature.
 ///
 /// Angles are in degrees, as UsdPhysics has them, and so is what is by an angle. `by` says in the second line
 /// what wrote the file; `more` are the caller's own notes, which stand in the file too.
@@ -19,8 +19,9 @@ pub fn usd(arm: &Arm, known: &Known, by: &str, more: &[String]) -> Exported {
     let mut notes = [more, &tree.notes].concat();
     if tree.links.iter().any(|link| link.armature.is_some()) {
         notes.push(
-            "a rotor is the armature of its joint: what it does when the link that carries it turns is left out"
-                .to_string(),
+            "a rotor is the armature of its joint: what it does when the link that carries it turns is left \
+            out"
+            .to_string(),
         );
     }
     for link in tree.links.iter().filter(|link| link.joint.mimic.is_some()) {
@@ -140,7 +141,8 @@ impl Stage {
         writeln!(text, "    def Physics{kind}Joint \"{own}\" (")?;
         writeln!(
             text,
-            "        prepend apiSchemas = [\"PhysicsDriveAPI:{axis}\", \"PhysxJointAxisAPI:{axis}\"]\n    )\n    {{"
+            "        prepend apiSchemas = [\"PhysicsDriveAPI:{axis}\", \"PhysxJointAxisAPI:{axis}\"]\n    \
+            )\n    {{"
         )?;
         writeln!(text, "        uniform token physics:axis = \"Z\"")?;
         writeln!(text, "        rel physics:body0 = </{root}/{before}>")?;

@@ -1,4 +1,5 @@
-//! Which sums take a product into their own operation: a·b + c, rounded once (a fused multiply-add, IEEE 754 §5.4.1).
+//! Which sums take a product into their own operation: a·b + c, rounded once (a fused multiply-add, IEEE 754
+//! §5.4.1).
 
 use super::{Expr, Graph, Holds, Node, operands};
 use std::cmp::Reverse;
@@ -9,10 +10,11 @@ const PRODUCT: usize = 3;
 const SUM: usize = 2;
 const QUOTIENT: usize = 13;
 
-/// The products that are formed within sums. Code that is printed, and bounds of its rounding, read it from here.
+/// The products that are formed within sums. Code that is printed, and bounds of its rounding, read it from
+/// here.
 ///
-/// It depends on the nodes that hold the state alone and on their order, so it is the same for a function before and after
-/// what depends on the parameters alone is taken out; of that nothing is contracted.
+/// It depends on the nodes that hold the state alone and on their order, so it is the same for a function
+/// before and after what depends on the parameters alone is taken out; of that nothing is contracted.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Contraction {
     /// Of each node that is a sum, the product that it takes in.
@@ -28,9 +30,9 @@ impl Contraction {
         Contraction { product: vec![None; nodes], within: vec![false; nodes] }
     }
 
-    /// Every product that is a term of one sum and is needed nowhere else, where that lets no result wait longer: a sum
-    /// that takes a product in comes two cycles later after its other term than a plain one. Of two products in a sum it
-    /// is the one that is there later, of two at once the one that is formed first.
+    /// Every product that is a term of one sum and is needed nowhere else, where that lets no result wait
+    /// longer: a sum that takes a product in comes two cycles later after its other term than a plain one. Of
+    /// two products in a sum it is the one that is there later, of two at once the one that is formed first.
     pub fn of(graph: &Graph, outputs: &[Expr]) -> Contraction {
         let mut contraction = Contraction::none(graph);
         let needed = graph.needed(outputs);
@@ -133,7 +135,8 @@ mod tests {
         assert_eq!(contraction.count(), 1);
     }
 
-    /// x·y is there when the last term of the longest sum is waited for: within it, that sum would come later.
+    /// x·y is there when the last term of the longest sum is waited for: within it, that sum would come
+    /// later.
     #[test]
     fn no_result_waits_longer() {
         let b = Builder::new();

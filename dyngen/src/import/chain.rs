@@ -265,12 +265,13 @@ impl Walk<'_> {
             self.refused.push(format!("line {}: joint '{name}' mimics itself", joint.line));
         } else if self.path.iter().any(leads) {
             self.notes.push(format!(
-                "joint '{name}' follows joint '{leader}': q({name}) = {ratio}·q({leader}) + {offset}. It is a \
-                 link of the arm without a coordinate of its own"
+                "joint '{name}' follows joint '{leader}': q({name}) = {ratio}·q({leader}) + {offset}. It is \
+                 a link of the arm without a coordinate of its own"
             ));
         } else {
             self.refused.push(format!(
-                "joint '{name}' mimics joint '{leader}', which is not on the chain: --lock {leader}=0 holds both"
+                "joint '{name}' mimics joint '{leader}', which is not on the chain: --lock {leader}=0 holds \
+                both"
             ));
         }
     }

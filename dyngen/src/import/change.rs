@@ -106,8 +106,8 @@ fn displacements(chain: &Chain, q: &[f64]) -> Vec<Pose> {
 /// m/s²
 const GRAVITY: f64 = 9.81;
 
-/// The mass matrix, Σ over bodies of m·vᵢ·vⱼ + ωᵢᵀ·I·ωⱼ with the velocities that unit joint velocities give; and the
-/// torques that hold the bodies' weight, Σ m·g·v_z.
+/// The mass matrix, Σ over bodies of m·vᵢ·vⱼ + ωᵢᵀ·I·ωⱼ with the velocities that unit joint velocities give;
+/// and the torques that hold the bodies' weight, Σ m·g·v_z.
 fn mass_matrix_and_weight(chain: &Chain, moved: &[Pose]) -> (Vec<Vec<f64>>, Vec<f64>) {
     let n = chain.joints.len();
     let (mut matrix, mut torques) = (vec![vec![0.0; n]; n], vec![0.0; n]);

@@ -10,7 +10,8 @@ pub(super) enum Equality {
     Follows { joint: String, leader: String, offset: f64, ratio: f64 },
     /// A joint stands at an offset from its reference.
     Stands { joint: String, offset: f64 },
-    /// Two bodies, or the bodies of two sites, have a point in common; where no site is named it is given in the first.
+    /// Two bodies, or the bodies of two sites, have a point in common; where no site is named it is given in
+    /// the first.
     Connects { bodies: [String; 2], sites: Option<[String; 2]>, anchor: [f64; 3] },
     /// Why it is left out.
     LeftOut(&'static str),

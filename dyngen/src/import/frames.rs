@@ -6,8 +6,8 @@
 //! Appl. Mech. 22 (1955) 215; J. J. Craig, Introduction to Robotics, 3rd ed., §3.4.
 //!
 //! Axes that are almost parallel have their common normal far away, and a small change of an axis moves it by
-//! metres (S. Hayati, IEEE CDC 1983). There only the normal's direction is taken: the origin of the far axis is
-//! where it meets the plane across the near one, and a row goes to it by `a` and `b`, along x and y.
+//! metres (S. Hayati, IEEE CDC 1983). There only the normal's direction is taken: the origin of the far axis
+//! is where it meets the plane across the near one, and a row goes to it by `a` and `b`, along x and y.
 
 use super::Options;
 use super::chain::{Chain, ChainJoint};
@@ -65,8 +65,8 @@ pub(super) fn place(chain: &Chain, options: &Options) -> Result<Frames, String> 
         let farthest = normal.a.max(away[0]).max(away[1]);
         if farthest.is_nan() || farthest > LARGEST_LENGTH {
             return Err(format!(
-                "the axes of joints '{}' and '{}' are {farthest:.0} m apart, or their common normal is as far \
-                 from their origins: is a length in mm?",
+                "the axes of joints '{}' and '{}' are {farthest:.0} m apart, or their common normal is as \
+                 far from their origins: is a length in mm?",
                 near.name, far.name
             ));
         }

@@ -2,8 +2,8 @@
 //! it.
 //!
 //! 0. `source`: the file's letters and what it includes; `urdf`, `mjcf`: its links and joints.
-//! 1. `tree`, `chain`: from the tree of links to one chain: fixed joints merged, everything at q = 0 in the root
-//!    link's frame.
+//! 1. `tree`, `chain`: from the tree of links to one chain: fixed joints merged, everything at q = 0 in the
+//!    root link's frame.
 //! 2. `rounding`: the nearest arm with right angles and without residues of lengths.
 //!    `change`: what that does to the tip and to the mass matrix.
 //! 3. `frames`: Denavit–Hartenberg frames on the joint axes, by their common normals.
@@ -93,7 +93,7 @@ impl Imported {
 pub enum ImportError {
     /// The text is no URDF.
     Unreadable(String),
-    /// It is one, but not of a serial arm: every reason that was found.
+    /// A robot description, but not of a serial arm: every reason that was found.
     Refused(Vec<String>),
 }
 
@@ -208,7 +208,8 @@ fn meant(robot: &urdf::Robot, written: chain::Chain, options: &Options) -> Resul
         let change = Change::between(&written, &chain);
         chain.notes.extend(moved.into_iter().map(|joint| format!("taken as meant: {joint}")));
         chain.notes.push(format!(
-            "these numbers are rounded; taken as meant they {} over the joints' ranges (--exact keeps every digit)",
+            "these numbers are rounded; taken as meant they {} over the joints' ranges (--exact keeps every \
+            digit)",
             in_words(&change)
         ));
     }

@@ -106,8 +106,8 @@ fn across(factor: f64, [x, y, z]: [f64; 3]) -> Vector3<f64> {
     Vector3::new(y * y + z * z, z * z + x * x, x * x + y * y) * factor
 }
 
-/// Volume, and moments of inertia for a unit of mass: a cylinder of half length h between two half spheres, whose
-/// centres of mass lie 3/8 of the radius r behind their faces.
+/// Volume, and moments of inertia for a unit of mass: a cylinder of half length h between two half spheres,
+/// whose centres of mass lie 3/8 of the radius r behind their faces.
 fn capsule(r: f64, h: f64) -> (f64, Vector3<f64>) {
     let (ends, middle) = (4.0 / 3.0 * PI * r.powi(3), 2.0 * PI * r * r * h);
     let volume = ends + middle;

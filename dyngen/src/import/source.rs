@@ -83,7 +83,8 @@ impl Source {
     /// Reads a file in UTF-8, UTF-16 or Latin-1, and what it includes.
     ///
     /// # Errors
-    /// Where a file cannot be read, or an `<include>` cannot be followed: its name, and the line that names it.
+    /// Where a file cannot be read, or an `<include>` cannot be followed: its name, and the line that names
+    /// it.
     pub fn read(path: &Path) -> Result<Source, ImportError> {
         let file = path.display().to_string();
         let unreadable = |e: String| ImportError::Unreadable(format!("{file}: {e}"));

@@ -248,8 +248,8 @@ fn link_values(masses: &[Mass], frame: &Pose) -> [f64; 10] {
     parameters_of_body(mass, &moment, &tensor)
 }
 
-/// A length as a decimal: to 1e-12 m where that is the number but for rounding, so that lengths that are meant to be
-/// equal are; to 1e-15 m otherwise, as a wheel of 1e-5 kg·m² feels its axis 1e-12 m aside.
+/// A length as a decimal: to 1e-12 m where that is the number but for rounding, so that lengths that are
+/// meant to be equal are; to 1e-15 m otherwise, as a wheel of 1e-5 kg·m² feels its axis 1e-12 m aside.
 fn length(value: f64) -> String {
     let short = decimal(value, 12);
     let meant = short.parse().is_ok_and(|short: f64| (value - short).abs() < ROUNDING * value.abs().max(1.0));

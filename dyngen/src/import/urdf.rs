@@ -29,7 +29,8 @@ pub(crate) struct Link {
     pub(crate) mass: f64,
     /// ixx, ixy, ixz, iyy, iyz, izz, kg·m²
     pub(crate) inertia: [f64; 6],
-    /// Whether it is more than a part of a joint: where it is fixed to another link its frame has a name of its own.
+    /// Whether it is more than a part of a joint: where it is fixed to another link its frame has a name of
+    /// its own.
     pub(crate) is_named: bool,
     /// Frames on it by their names.
     pub(crate) sites: Vec<(String, Origin)>,

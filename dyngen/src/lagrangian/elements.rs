@@ -136,8 +136,8 @@ pub trait Source<V> {
     fn d(&mut self, joint: usize) -> V;
     /// Gear ratio.
     fn ratio(&mut self, joint: usize) -> V;
-    /// A number of the arm that is none of its sizes: an entry of a transmission's matrix, a coordinate of the
-    /// pin of a bar.
+    /// A number of the arm that is none of its sizes: an entry of a transmission's matrix, a coordinate of
+    /// the pin of a bar.
     fn exact(&mut self, value: &Rational) -> V;
     /// Component of gravity; requested only if it is not zero.
     fn gravity(&mut self, axis: usize) -> V;

@@ -7,8 +7,8 @@ use dashu_int::IBig;
 use num_traits::{FromPrimitive, One, Signed, Zero};
 use std::f64::consts::TAU;
 
-/// Sine and cosine of the trigonometric input of every joint, where each group of joints that move together is at
-/// a point of the circle that `draw` gives.
+/// Sine and cosine of the trigonometric input of every joint, where each group of joints that move together
+/// is at a point of the circle that `draw` gives.
 ///
 /// An angle that is p/q of another is p times one of which the other is q times. Where p or q exceeds
 /// `largest`, the angle gets a point of its own: no sum of fewer than p or q angles distinguishes the two, so

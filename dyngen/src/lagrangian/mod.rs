@@ -22,8 +22,8 @@ pub struct Motion<V> {
     pub height: V,
 }
 
-/// Twice the coefficient of every dynamic parameter in the Lagrangian, eleven a link, then a bar, in the order of Eq. 10:
-/// L = ½ Σ columns·π.
+/// Twice the coefficient of every dynamic parameter in the Lagrangian, eleven a link, then a bar, in the
+/// order of Eq. 10: L = ½ Σ columns·π.
 ///
 /// Twice, so that integer polynomials stay integer. Positions of frame origins enter the potential
 /// energy U = −gᵀ(m p + m r) of Eq. 6 (p: origin, r: centre of mass).
@@ -61,7 +61,8 @@ pub fn motions<A: Algebra>(alg: &A, arm: &ArmElements<A::Value>) -> Vec<Motion<A
     arm.joints.iter().scan(Motion::base(alg, arm), next).collect()
 }
 
-/// Twice the coefficients of the ten inertial parameters of a body that is fixed to the tool's frame of a link.
+/// Twice the coefficients of the ten inertial parameters of a body that is fixed to the tool's frame of a
+/// link.
 pub fn twice_lagrangian_of_tool<A: Algebra>(
     alg: &A,
     arm: &ArmElements<A::Value>,

@@ -39,7 +39,8 @@ impl<'p, 'a> State<'p, 'a> {
         self.point.dof()
     }
 
-    /// The Lagrangian's columns as jets: those of the arm's parameters, then, where the arm is loaded, the payload's.
+    /// The Lagrangian's columns as jets: those of the arm's parameters, then, where the arm is loaded, the
+    /// payload's.
     fn lagrangian<A: OverPrime + Copy>(
         &self,
         algebra: A,
@@ -104,7 +105,8 @@ impl<'p, 'a> State<'p, 'a> {
         self.weighed_torques(algebra, &columns, |x| x.1)
     }
 
-    /// The mixed second derivatives of the torques: in a direction of q and q̇ together, and in one of a single coordinate.
+    /// The mixed second derivatives of the torques: in a direction of q and q̇ together, and in one of a
+    /// single coordinate.
     pub(super) fn torque_second_derivative(&self, along: (&[Fp], &[Fp]), direction: Direction) -> Vec<Fp> {
         let one = |is: bool| if is { Fp::ONE } else { Fp::ZERO };
         let change = |j: usize| mixed(Fp::ZERO, along.0[j], one(direction == Direction::Position(j)));

@@ -1,5 +1,5 @@
-//! Mass, centre of mass and momentum of the whole arm, from its Lagrangian: momentum is the derivative of the kinetic
-//! energy by a velocity of the root link, first moments that of the potential energy by gravity.
+//! Mass, centre of mass and momentum of the whole arm, from its Lagrangian: momentum is the derivative of the
+//! kinetic energy by a velocity of the root link, first moments that of the potential energy by gravity.
 
 use super::half;
 use super::point::{Motion as Follows, Point};
@@ -14,8 +14,8 @@ type Dual = (Fp, Fp);
 
 const DUALS: Duals<PrimeField> = Duals(PrimeField);
 
-/// The infinitesimal change of L where the root link's velocity, angular velocity or gravity changes, with the values of
-/// the point's parameters.
+/// The infinitesimal change of L where the root link's velocity, angular velocity or gravity changes, with
+/// the values of the point's parameters.
 fn change(point: &Point<'_>, velocities: &[Fp], root: Motion<Dual>) -> Fp {
     let mut varied = Varied { algebra: DUALS, point, change: vec![DUALS.integer(0); point.dof()] };
     let base = varied.placement(&point.arm.base);

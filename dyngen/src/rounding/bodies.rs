@@ -1,23 +1,24 @@
-//! Ranges of LᵀDL and of B⁻¹ from the links' bodies alone, for every pose: where boxes of poses prove nothing, since the
-//! last links are light.
+//! Ranges of LᵀDL and of B⁻¹ from the links' bodies alone, for every pose: where boxes of poses prove
+//! nothing, since the last links are light.
 //!
 //! Twice the kinetic energy, q̇ᵀBq̇, is at least that of any of the links, where each is a body.
 //!
-//! * A pivot dᵢ is q̇ᵀBq̇ at its smallest with q̇ᵢ = 1 and the joints before at rest (Featherstone, *Rigid Body
-//!   Dynamics Algorithms* (2008), §7.3: the articulated inertia about the joint). The link alone has its inertia about the
-//!   axis, and dᵢ ≤ Bᵢᵢ.
-//! * (B⁻¹)ᵢᵢ is the largest q̇ᵢ² with q̇ᵀBq̇ = 1. A joint's velocity is the difference of those of two links about its
-//!   axis z, and ω of a body with inertia I about its centre has (z·ω)² ≤ zᵀI⁻¹z times ωᵀIω. The sum of both links'
-//!   zᵀI⁻¹z is bᵢ ≥ (B⁻¹)ᵢᵢ.
-//! * Everything else by the inequality of Cauchy and Schwarz: |(B⁻¹)ᵢⱼ|² ≤ bᵢbⱼ, |Lₖⱼ|² ≤ Bⱼⱼ/dₖ, and column k of L⁻¹ is
-//!   how joints without torque move if joint k does with 1: twice the energy is dₖ, so |L⁻¹ⱼₖ|² ≤ bⱼdₖ.
+//! * A pivot dᵢ is q̇ᵀBq̇ at its smallest with q̇ᵢ = 1 and the joints before at rest (Featherstone, *Rigid
+//!   Body Dynamics Algorithms* (2008), §7.3: the articulated inertia about the joint). The link alone has its
+//!   inertia about the axis, and dᵢ ≤ Bᵢᵢ.
+//! * (B⁻¹)ᵢᵢ is the largest q̇ᵢ² with q̇ᵀBq̇ = 1. A joint's velocity is the difference of those of two links
+//!   about its axis z, and ω of a body with inertia I about its centre has (z·ω)² ≤ zᵀI⁻¹z times ωᵀIω. The
+//!   sum of both links' zᵀI⁻¹z is bᵢ ≥ (B⁻¹)ᵢᵢ.
+//! * Everything else by the inequality of Cauchy and Schwarz: |(B⁻¹)ᵢⱼ|² ≤ bᵢbⱼ, |Lₖⱼ|² ≤ Bⱼⱼ/dₖ, and column
+//!   k of L⁻¹ is how joints without torque move if joint k does with 1: twice the energy is dₖ, so |L⁻¹ⱼₖ|² ≤
+//!   bⱼdₖ.
 
 use super::factors::{Factors, MassMatrix};
 use super::interval::Interval;
-use crate::arm::{Arm, Convention, Joint, JointKind, ParameterKind};
+use crate::arm::{Arm, Convention, Joint, JointKind, Parameter, ParameterKind};
 use crate::consistency::pseudo_inertia;
 use crate::exact::rational::to_f64;
-use crate::parameters::ParameterSet;
+use crate::parameters::{ParameterSet, SetParameter};
 use nalgebra::{Matrix3, Vector3};
 
 /// A link as a body.
@@ -38,8 +39,8 @@ struct Axis {
     point: Vector3<f64>,
 }
 
-/// The ranges for `values` of the full set; `None` where a link is no body with mass and volume, or the energy is more than
-/// that of the links: rotors, bars of loops, joints that follow others.
+/// The ranges for `values` of the full set; `None` where a link is no body with mass and volume, or the
+/// energy is more than that of the links: rotors, bars of loops, joints that follow others.
 pub(super) fn factors(arm: &Arm, set: &ParameterSet, values: &[f64], mass: &MassMatrix) -> Option<Factors> {
     let most = mass.largest_diagonal(HALVINGS)?;
     let n = most.len();
@@ -113,7 +114,8 @@ const THIN: f64 = 1e-9;
 impl Body {
     fn of(arm: &Arm, set: &ParameterSet, values: &[f64], link: usize) -> Option<Body> {
         let given = |kind: &ParameterKind| -> f64 {
-            let own = |p: &crate::parameters::SetParameter| matches!(&p.terms[..], [(q, _)] if q.link == link && q.kind == *kind);
+            let wanted = Parameter { link, kind: *kind };
+            let own = |p: &SetParameter| matches!(&p.terms[..], [(q, _)] if *q == wanted);
             set.parameters.iter().position(own).and_then(|k| values.get(k)).copied().unwrap_or(0.0)
         };
         let v: [f64; 10] = std::array::from_fn(|k| given(&ParameterKind::ALL[k]));

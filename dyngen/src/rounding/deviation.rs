@@ -1,8 +1,10 @@
-//! Bounds of functions that divide by pivots of B: exact values and what the emitted ones are off by, kept apart.
+//! Bounds of functions that divide by pivots of B: exact values and what the emitted ones are off by, kept
+//! apart.
 //!
-//! What is known of a solve (`known.rs`) holds for exact values alone. So each operation has the range of its exact value
-//! and, forwards from its operands, how far the emitted one may be off (running error analysis, Higham 2002, §3.3). The
-//! derivatives by each rounding are operations like the others: at every t·δ they are within the same two.
+//! What is known of a solve (`known.rs`) holds for exact values alone. So each operation has the range of its
+//! exact value and, forwards from its operands, how far the emitted one may be off (running error analysis,
+//! Higham 2002, §3.3). The derivatives by each rounding are operations like the others: at every t·δ they are
+//! within the same two.
 
 use super::energy::Solves;
 use super::interval::Interval;

@@ -1,13 +1,16 @@
-//! What a solve with LᵀDL may be off, in the norm of the kinetic energy: where a forward bound grows from joint to joint.
+//! What a solve with LᵀDL may be off, in the norm of the kinetic energy: where a forward bound grows from
+//! joint to joint.
 //!
-//! Backward analysis (Higham, *Accuracy and Stability of Numerical Algorithms* (2002), §8.1 and §10.1). The computed
-//! factors are the exact ones of B + ΔB, with ΔBᵢⱼ what the sum for an entry rounds. With bᵢ ≥ (B⁻¹)ᵢᵢ, xᵢ² ≤ bᵢ·xᵀBx, so
-//! |xᵀΔB·x| ≤ η·xᵀBx with η = Σ √(bᵢbⱼ)·|ΔBᵢⱼ|: K(B + ΔB)Kᵀ = 1 + E with |Eᵢⱼ| ≤ η, and the factors of 1 + E are 1 within
-//! N = η/(1 − nη), as in `factors.rs`. The solves add residuals: e of Lᵀy = r + e counts √bᵢ·eᵢ, one of L·x = z counts
-//! √dᵢ·eᵢ; ρ is their sum, and R = Σ √bⱼ·|rⱼ| ≥ √(xᵀBx).
+//! Backward analysis (Higham, *Accuracy and Stability of Numerical Algorithms* (2002), §8.1 and §10.1). The
+//! computed factors are the exact ones of B + ΔB, with ΔBᵢⱼ what the sum for an entry rounds. Let bᵢ be at
+//! least (B⁻¹)ᵢᵢ, so that xᵢ² ≤ bᵢ·xᵀBx. With η = Σ √(bᵢbⱼ)·|ΔBᵢⱼ| then |xᵀΔB·x| ≤ η·xᵀBx, that is,
+//! K(B + ΔB)Kᵀ = 1 + E with |Eᵢⱼ| ≤ η, and the factors of 1 + E are 1 within N = η/(1 − nη), as in
+//! `factors.rs`. The solves add residuals: e of Lᵀy = r + e counts √bᵢ·eᵢ, one of L·x = z counts √dᵢ·eᵢ.
+//! ρ is their sum, and R = Σ √bⱼ·|rⱼ| is at least √(xᵀBx).
 //!
-//! An operation is taken for one of a solve where it has that one's value at a random point of the prime field, and where
-//! it keeps the equation of the solve when factors and results before it are replaced by random numbers.
+//! An operation is taken for one of a solve where it has that one's value at a random point of the prime
+//! field, and where it keeps the equation of the solve when factors and results before it are replaced by
+//! random numbers.
 
 use super::factors::Factors;
 use super::interval::Interval;
@@ -69,7 +72,8 @@ pub(super) struct Running {
 }
 
 impl Solves {
-    /// `values` are those of the emitted operations at the random point; `None` where the ranges are not those of bodies.
+    /// `values` are those of the emitted operations at the random point; `None` where the ranges are not
+    /// those of bodies.
     pub(super) fn new(
         exact: &Exact,
         ranges: &Factors,
@@ -96,9 +100,9 @@ impl Solves {
         Running { eta: [0.0; 2], rho: vec![[0.0; 2]; self.rights.len()], local: Vec::new() }
     }
 
-    /// Takes the next operation in: the range of its exact value, a forward bound of how far it is off, and what it rounds
-    /// by itself. `values` and `deviations` are those of the operations before. Returns range and bound with what
-    /// is known of solves.
+    /// Takes the next operation in: the range of its exact value, a forward bound of how far it is off, and
+    /// what it rounds by itself. `values` and `deviations` are those of the operations before. Returns range
+    /// and bound with what is known of solves.
     pub(super) fn take(
         &self,
         running: &mut Running,
@@ -292,8 +296,8 @@ impl<'a> Recognised<'a> {
         Recognised { exact, operations, values, roles, of_role, factors, lower, pivots, draws }
     }
 
-    /// Evaluates all operations with the numbers in the place of those that they stand for, and gives these their roles;
-    /// `more` goes behind the factors.
+    /// Evaluates all operations with the numbers in the place of those that they stand for, and gives these
+    /// their roles; `more` goes behind the factors.
     fn replace(&mut self, more: &[FxHashMap<u64, Stand>]) {
         let mut replaced: Vec<Fp> = Vec::with_capacity(self.values.len());
         for (k, operation) in self.operations.iter().enumerate() {

@@ -1,13 +1,13 @@
 //! B = LᵀDL and its inverse for every pose within the limits: B is proven positive definite there.
 //!
-//! Over a box of poses with centre c, K = D_c^(−½)·L_c⁻ᵀ makes B_c the identity, so K·B·Kᵀ = 1 + E with a small E. Where
-//! the spectral radius of |E| is below 1, B is positive definite, and the inverse and the factors of 1 + E are 1 within
-//! N = |E| + |E|² + …, entry by entry; the products with those of B_c are B⁻¹, L and D of every pose of the box. Boxes are
-//! halved until the radius is small enough. It is at most the largest (|E|·w)ᵢ/wᵢ for any w > 0 (Collatz); a few steps of
-//! the power method give a good w.
+//! Over a box of poses with centre c, K = D_c^(−½)·L_c⁻ᵀ makes B_c the identity, so K·B·Kᵀ = 1 + E with a
+//! small E. Where the spectral radius of |E| is below 1, B is positive definite, and the inverse and the
+//! factors of 1 + E are 1 within N = |E| + |E|² + …, entry by entry; the products with those of B_c are B⁻¹,
+//! L and D of every pose of the box. Boxes are halved until the radius is small enough. It is at most the
+//! largest (|E|·w)ᵢ/wᵢ for any w > 0 (Collatz); a few steps of the power method give a good w.
 //!
-//! Positive definite matrices of an interval by a congruence: Rump, "Verification methods" (2010), §10; Rohn, "Positive
-//! definiteness and stability of interval matrices" (1994).
+//! Positive definite matrices of an interval by a congruence: Rump, "Verification methods" (2010), §10; Rohn,
+//! "Positive definiteness and stability of interval matrices" (1994).
 
 use super::gradient::Gradient;
 use super::interval::Interval;
@@ -63,7 +63,8 @@ impl MassMatrix {
         Some(MassMatrix { entries, n, ranges: ranges?, varied, code })
     }
 
-    /// Halves boxes of poses until e is below `most` in each of them; `None` where that takes more than `boxes`.
+    /// Halves boxes of poses until e is below `most` in each of them; `None` where that takes more than
+    /// `boxes`.
     pub(super) fn factors(&self, most: f64, boxes: usize) -> Option<Factors> {
         let mut found = Factors::none(self.n);
         // Each with its share of all poses.
@@ -92,8 +93,8 @@ impl MassMatrix {
         Some(found)
     }
 
-    /// At least the largest entries of the diagonal; poses are halved where an entry's bound is largest, `boxes` times
-    /// for each. `None` where an angle is too large.
+    /// At least the largest entries of the diagonal; poses are halved where an entry's bound is largest,
+    /// `boxes` times for each. `None` where an angle is too large.
     pub(super) fn largest_diagonal(&self, boxes: usize) -> Option<Vec<f64>> {
         let mut gradient = Gradient::default();
         let m = self.varied.len();

@@ -1,4 +1,5 @@
-//! Values of several outputs over a box with their derivatives by the positions: forwards, one interval for each.
+//! Values of several outputs over a box with their derivatives by the positions: forwards, one interval for
+//! each.
 
 use super::interval::Interval;
 use super::program::{Emitted, Operation};
@@ -14,7 +15,8 @@ pub(super) struct Gradient {
 const ZERO: Interval = Interval::point(0.0);
 
 impl Gradient {
-    /// For operations without a division; `None` where an angle is too large. `varied` are places in the variables.
+    /// For operations without a division; `None` where an angle is too large. `varied` are places in the
+    /// variables.
     pub(super) fn evaluate(&mut self, code: &Emitted, ranges: &[Interval], varied: &[usize]) -> Option<()> {
         let m = varied.len();
         self.values.clear();

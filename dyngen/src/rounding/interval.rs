@@ -51,7 +51,8 @@ impl Interval {
         [Interval { high: middle, ..self }, Interval { low: middle, ..self }]
     }
 
-    /// Everything within `by` of a number in it, widened by more than an operation that gave its ends may have rounded.
+    /// Everything within `by` of a number in it, widened by more than an operation that gave its ends may
+    /// have rounded.
     #[inline]
     pub(super) fn widened(self, by: f64) -> Interval {
         let by = by + ROUNDED * self.magnitude() + f64::MIN_POSITIVE;

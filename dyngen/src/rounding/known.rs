@@ -1,8 +1,9 @@
 //! What is known of the numbers between B and the results of a solve with LᵀDL: bounds for every pose.
 //!
-//! The optimiser is free to reorder sums, so an operation is recognised by its value: at a random point of the 61-bit prime
-//! field it equals that of an entry of L, of B⁻¹, … (two that differ agree there with a chance below 2⁻⁵⁴, as in
-//! `prove/`). The same holds for derivatives of the result by each of the operations.
+//! The optimiser is free to reorder sums, so an operation is recognised by its value: at a random point of
+//! the 61-bit prime field it equals that of an entry of L, of B⁻¹, … (two that differ agree there with a
+//! chance below 2⁻⁵⁴, as in `prove/`). The same holds for derivatives of the result by each of the
+//! operations.
 
 use super::energy::{Exact, Solves};
 use super::factors::Factors;
@@ -19,9 +20,9 @@ use std::rc::Rc;
 /// A bound of an operation's exact value.
 #[derive(Clone, Debug)]
 pub(super) enum Known {
-    /// It lies there.
+    /// The value lies in this interval.
     Range(Interval),
-    /// Its size is at most the sum of factors times the sizes of other operations.
+    /// The value's size is at most the sum of factors times the sizes of other operations.
     Sum(Vec<(f64, usize)>),
 }
 

@@ -1,14 +1,14 @@
 //! By how much emitted code may be off, for every state within the limits of the arm file.
 //!
-//! Emitted code does the operations of the graph in the graph's order, so what each of them rounds is known: at most
-//! half a unit in the last place of its result. A derivative of the output by that error, over intervals, says what it
-//! does to the output; the sum over all operations is a bound. It is sound without terms of second order, because
-//! intervals hold the rounded values too (the mean value theorem, as in `program.rs`). The states are
-//! split where the bound is largest.
+//! Emitted code does the operations of the graph in the graph's order, so what each of them rounds is known:
+//! at most half a unit in the last place of its result. A derivative of the output by that error, over
+//! intervals, says what it does to the output; the sum over all operations is a bound. It is sound without
+//! terms of second order, because intervals hold the rounded values too (the mean value theorem, as in
+//! `program.rs`). The states are split where the bound is largest.
 //!
-//! Intervals: Moore, *Interval Analysis* (1966). Rounding errors by derivatives: Linnainmaa, "Taylor expansion of the
-//! accumulated rounding error" (1976); with interval or symbolic remainder: Darulova and Kuncak (Rosa, 2014), Solovyev
-//! et al. (FPTaylor, 2015).
+//! Intervals: Moore, *Interval Analysis* (1966). Rounding errors by derivatives: Linnainmaa, "Taylor
+//! expansion of the accumulated rounding error" (1976); with interval or symbolic remainder: Darulova and
+//! Kuncak (Rosa, 2014), Solovyev et al. (FPTaylor, 2015).
 
 mod angle;
 mod bodies;
@@ -38,8 +38,8 @@ use limits::Limits;
 use program::Program;
 use std::sync::OnceLock;
 
-/// Bounds of one function by output, row by row: of |emitted − exact|, in the outputs' units. Infinite where a divisor
-/// may be zero for all that intervals show.
+/// Bounds of one function by output, row by row: of |emitted − exact|, in the outputs' units. Infinite where
+/// a divisor may be zero for all that intervals show.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bounds {
     /// In `f32`.
@@ -48,12 +48,12 @@ pub struct Bounds {
     pub double: Vec<f64>,
 }
 
-/// Bounds for a function of an arm. `parameters` are the values of its set; where there are none, each parameter is
-/// within ±1 in SI units. So is each number of the vector e, of the wrench f, of a payload
-/// and of a direction.
+/// Bounds for a function of an arm. `parameters` are the values of its set; where there are none, each
+/// parameter is within ±1 in SI units. So is each number of the vector e, of the wrench f, of a payload and
+/// of a direction.
 ///
-/// What the function is given counts as exact. The same input gives the same bounds on every machine but for what
-/// sines of the standard library do to their last digits.
+/// What the function is given counts as exact. The same input gives the same bounds on every machine but for
+/// what sines of the standard library do to their last digits.
 ///
 /// # Errors
 /// The limit that the arm file lacks, or why pivots of B may be zero, in words.
@@ -77,8 +77,8 @@ impl<'a> Bounder<'a> {
         Bounder { model, parameters, links: None, factors: OnceLock::new() }
     }
 
-    /// With the same values in the full set: each link is then known as a body, and more arms have bounds of functions
-    /// that divide by pivots of B.
+    /// With the same values in the full set: each link is then known as a body, and more arms have bounds of
+    /// functions that divide by pivots of B.
     #[must_use]
     pub fn with_links(self, values: Option<&'a [f64]>) -> Self {
         Bounder { links: values, ..self }
@@ -140,12 +140,12 @@ impl<'a> Bounder<'a> {
         let Some(rough) = mass.factors(ROUGH, BOXES).or_else(of_bodies) else {
             return Err(match self.worst(Function::MassMatrix, values) {
                 Ok((smallest, pose)) if smallest <= 0.0 => format!(
-                    "B(q) is not positive definite with these values: its smallest eigenvalue is {smallest:.2e} at q = \
-                     {pose}"
+                    "B(q) is not positive definite with these values: its smallest eigenvalue is \
+                     {smallest:.2e} at q = {pose}"
                 ),
                 Ok((smallest, pose)) => format!(
-                    "B(q) is not proven positive definite within the limits: the smallest eigenvalue that was found is \
-                     {smallest:.2e} at q = {pose}"
+                    "B(q) is not proven positive definite within the limits: the smallest eigenvalue that \
+                     was found is {smallest:.2e} at q = {pose}"
                 ),
                 Err(why) => why,
             });
@@ -165,8 +165,8 @@ impl<'a> Bounder<'a> {
         let Some(values) = self.parameters else { return ANY.to_string() };
         match self.worst(Function::TaskInertiaInverse, values) {
             Ok((smallest, pose)) => format!(
-                "the Jacobian is not proven to have rank six within the limits: the smallest eigenvalue of Λ⁻¹ that was \
-                 found is {smallest:.2e} at q = {pose}"
+                "the Jacobian is not proven to have rank six within the limits: the smallest eigenvalue of \
+                 Λ⁻¹ that was found is {smallest:.2e} at q = {pose}"
             ),
             Err(why) => why,
         }
@@ -205,16 +205,17 @@ const ANY: &str =
 /// Why there is no bound with a payload.
 const LOADED: &str = "with a payload within ±1 SI unit B(q) need not be positive definite";
 
-/// Norms of E that parts of the poses have at most: where that is enough to prove B positive, and what close bounds need.
+/// Norms of E that parts of the poses have at most: where that is enough to prove B positive, and what close
+/// bounds need.
 const ROUGH: f64 = 0.5;
 const FINE: f64 = 0.2;
 
 /// Parts of the poses that proving B positive is worth.
 const BOXES: usize = 100_000;
 
-/// Operations over intervals for one function: some 5 ms without values, some 50 ms where values are given, since then
-/// close bounds are what is asked for. The tenth part makes bounds 1.1 times as large in the median of 7444 outputs of 20
-/// arms, 1.4 times in one of ten.
+/// Operations over intervals for one function: some 5 ms without values, some 50 ms where values are given,
+/// since then close bounds are what is asked for. The tenth part makes bounds 1.1 times as large in the
+/// median of 7444 outputs of 20 arms, 1.4 times in one of ten.
 const EFFORT: [usize; 2] = [200_000, 2_000_000];
 
 /// Of functions that divide by pivots of B, less than a second each.

@@ -1,8 +1,9 @@
 //! What turns of vectors do not change: their length.
 //!
-//! Intervals of c·a + s·b and c·b − s·a grow by √2 with each turn, as if a and b were at their largest together with c
-//! and s. But the squares of the two sum up to a² + b². Followed back from joint to joint, a turned vector is bounded by
-//! the length of what was turned first; and any sum of two products by the lengths of two vectors (Cauchy and Schwarz).
+//! Intervals of c·a + s·b and c·b − s·a grow by √2 with each turn, as if a and b were at their largest
+//! together with c and s. But the squares of the two sum up to a² + b². Followed back from joint to joint, a
+//! turned vector is bounded by the length of what was turned first; and any sum of two products by the
+//! lengths of two vectors (Cauchy and Schwarz).
 
 use super::interval::Interval;
 use super::program::{Errors, Operation};
@@ -10,9 +11,9 @@ use super::program::{Errors, Operation};
 /// A bound of an operation's size.
 #[derive(Clone, Debug)]
 pub(super) enum Norm {
-    /// It is an entry of a vector.
+    /// The operation is an entry of a vector.
     Turned(Vec<Length>),
-    /// It is the product of two vectors, and rounds.
+    /// The operation is the product of two vectors, and rounds.
     Product(Vec<Length>, Vec<Length>, [usize; 3]),
 }
 
@@ -231,8 +232,8 @@ impl Form<'_> {
         }
     }
 
-    /// Of a product with a sine or cosine the other factor, which is not smaller; with the entry that is the same
-    /// factor's product with the cosine or sine, where there is one.
+    /// Of a product with a sine or cosine the other factor, which is not smaller; with the entry that is the
+    /// same factor's product with the cosine or sine, where there is one.
     fn part(&self, k: usize, length: &Length) -> Option<(usize, Option<usize>)> {
         let ways = factors(self.operations, k)?;
         let turns = |t: usize| matches!(self.operations[t], Operation::Sine(_) | Operation::Cosine(_));
@@ -255,6 +256,6 @@ impl Form<'_> {
 /// Steps back from one operation: some for each joint.
 const MOST_STEPS: usize = 16;
 
-/// By how much the emitted sine and cosine of `f32` may be longer than one, √2 units for each step back, and what
-/// computing the bound rounds.
+/// By how much the emitted sine and cosine of `f32` may be longer than one, √2 units for each step back, and
+/// what computing the bound rounds.
 const LONGER: f64 = 1.0 + 1e-5;

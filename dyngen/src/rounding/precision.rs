@@ -20,8 +20,8 @@ impl Precision {
         }
     }
 
-    /// At most what rounding a number of that size or less to the nearest changes: half a unit in the last place, also
-    /// where the result is subnormal.
+    /// At most what rounding a number of that size or less to the nearest changes: half a unit in the last
+    /// place, also where the result is subnormal.
     #[inline]
     pub(super) fn half_ulp(self, magnitude: f64) -> f64 {
         // The power of two at or below; the smallest subnormal number of the format on top.
@@ -40,8 +40,8 @@ impl Precision {
         }
     }
 
-    /// How far a constant of the emitted code is from the number that it stands for: it is written as a double, and
-    /// converted.
+    /// How far a constant of the emitted code is from the number that it stands for: it is written as a
+    /// double, and converted.
     pub(super) fn of_constant(self, exact: &Rational) -> f64 {
         let written = rational::to_f64(exact);
         let is_exact = rational::from_f64(written).as_ref() == Some(exact);

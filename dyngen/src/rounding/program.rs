@@ -101,7 +101,8 @@ impl Emitted {
     }
 }
 
-/// One output as a program: the emitted operations, then those of the output's derivatives by what each of them rounds.
+/// One output as a program: the emitted operations, then those of the output's derivatives by what each of
+/// them rounds.
 #[derive(Clone, Debug)]
 pub(super) struct Program {
     /// The emitted operations stand first; the rest is computed here alone and rounds nothing.
@@ -154,12 +155,13 @@ impl Program {
         self.operations.len()
     }
 
-    /// The most by which the emitted output may be off where each variable lies in its range; infinite where a divisor
-    /// may be zero or a value is too large for `f32`.
+    /// The most by which the emitted output may be off where each variable lies in its range; infinite where
+    /// a divisor may be zero or a value is too large for `f32`.
     ///
-    /// With δᵢ for what operation i rounds, the output is a function of all δ, and the exact one where they are zero.
-    /// By the mean value theorem the two differ by Σ ∂out/∂δᵢ·δᵢ, with the derivatives at some t·δ, 0 ≤ t ≤ 1. The
-    /// intervals hold the values of all operations for all such t, so nothing of second order is left out.
+    /// With δᵢ for what operation i rounds, the output is a function of all δ, and the exact one where they
+    /// are zero. By the mean value theorem the two differ by Σ ∂out/∂δᵢ·δᵢ, with the derivatives at some t·δ,
+    /// 0 ≤ t ≤ 1. The intervals hold the values of all operations for all such t, so nothing of second order
+    /// is left out.
     pub(super) fn errors(&self, ranges: &[Interval], workspace: &mut Workspace) -> Errors {
         if let Some(known) = &self.known {
             return self.errors_from_exact(known, ranges, workspace).unwrap_or([f64::INFINITY; 2]);
@@ -179,7 +181,8 @@ impl Program {
         total.map(|x| x * (1.0 + self.len() as f64 * f64::EPSILON))
     }
 
-    /// The values of all operations with what may have been rounded in them, and how much each emitted one rounds.
+    /// The values of all operations with what may have been rounded in them, and how much each emitted one
+    /// rounds.
     fn evaluate(&self, ranges: &[Interval], workspace: &mut Workspace) -> Option<()> {
         let Workspace { values, errors, .. } = workspace;
         values.clear();

@@ -1,5 +1,5 @@
-//! The largest bound over all states: the box of states is split where the bound is largest, until it is small enough
-//! or the effort is spent.
+//! The largest bound over all states: the box of states is split where the bound is largest, until it is
+//! small enough or the effort is spent.
 
 use super::interval::Interval;
 use super::program::{Errors, Program, Workspace};
@@ -32,8 +32,8 @@ impl PartialEq for Part {
 
 impl Eq for Part {}
 
-/// Bounds for every state of a box, from at most `evaluations` bounds of parts of it; `splits` says which variables are
-/// worth it.
+/// Bounds for every state of a box, from at most `evaluations` bounds of parts of it; `splits` says which
+/// variables are worth it.
 pub(super) fn bound(program: &Program, all: &[Interval], splits: &[bool], evaluations: usize) -> Errors {
     let mut workspace = Workspace::default();
     let mut of = |ranges: Vec<Interval>| Part { errors: program.errors(&ranges, &mut workspace), ranges };

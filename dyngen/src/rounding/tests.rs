@@ -30,7 +30,8 @@ use twice::Twice;
 struct State(Vec<(Argument, Vec<f64>)>);
 
 impl State {
-    /// Numbers of `f32` within the limits: half of the states have velocities, accelerations and torques at their limits.
+    /// Numbers of `f32` within the limits: half of the states have velocities, accelerations and torques at
+    /// their limits.
     fn draw(arm: &Arm, parameters: &[f64], rng: &mut ChaCha8Rng) -> State {
         let (corner, end) = (rng.random_range(0..2) == 0, rng.random_range(0..8) == 0);
         let mut number = |low: f64, high: f64, at_end: bool| {
@@ -82,7 +83,8 @@ impl State {
         self.of(Argument::Positions, i)
     }
 
-    /// The outputs to twice a double's digits; of arms without offsets and symbols, whose angles are exact sums.
+    /// The outputs to twice a double's digits; of arms without offsets and symbols, whose angles are exact
+    /// sums.
     fn exact(&self, built: &FunctionGraph) -> Vec<Twice> {
         let turned = |sum: JointSum| {
             let add = |all: Twice, (joint, negative): (usize, bool)| {
@@ -243,8 +245,8 @@ fn no_state_of_the_lwa_4p_is_further_off_than_its_bound() {
             continue;
         };
         let seen = Seen::of(&model, &values, (&built, bounds), 200, 50);
-        // A bound that holds for everything says nothing: those of the common functions are near what is seen, but of
-        // accelerations of points intervals know less.
+        // A bound that holds for everything says nothing: those of the common functions are near what is
+        // seen, but of accelerations of points intervals know less.
         let loose = function == Function::JacobianRateTimesVelocity;
         let is_common = Function::common().any(|common| common == function);
         if is_common || function == Function::TaskInertiaInverse {
@@ -258,8 +260,8 @@ fn no_state_of_the_lwa_4p_is_further_off_than_its_bound() {
     }
 }
 
-/// Turning joints and one that slides, with a wrist so light that boxes of poses prove nothing; values of the full and of
-/// the minimal set.
+/// Turning joints and one that slides, with a wrist so light that boxes of poses prove nothing; values of the
+/// full and of the minimal set.
 fn light_wrist(convention: &str, [alpha_4, theta]: [&str; 2]) -> (Model, Vec<f64>, Vec<f64>) {
     let joint = |(kind, alpha, torque): (&str, &str, f64)| {
         format!(
@@ -344,8 +346,8 @@ fn no_state_is_further_off_than_the_bound_of_contracted_code() {
     }
 }
 
-/// What is taken out of a function for all states changes nothing of what is contracted in the rest, so a bound of the
-/// whole is one of the code.
+/// What is taken out of a function for all states changes nothing of what is contracted in the rest, so a
+/// bound of the whole is one of the code.
 #[test]
 fn contraction_is_that_of_the_code_behind_the_preparation() {
     let (model, _) = lwa4p();
@@ -438,8 +440,8 @@ fn ranges_of_factors_hold_every_pose() {
     }
 }
 
-/// `near` says how near to its end the range of the first entry of B⁻¹ must be reached: ranges that hold everything would
-/// say nothing.
+/// `near` says how near to its end the range of the first entry of B⁻¹ must be reached: ranges that hold
+/// everything would say nothing.
 fn ranges_hold_every_pose(
     (model, built): (&Model, &FunctionGraph),
     values: &[f64],
@@ -510,7 +512,8 @@ fn no_acceleration_of_a_million_is_further_off_than_its_bound() {
 fn compare_at_length(wanted: impl Fn(Function) -> bool) {
     let (model, values) = lwa4p();
     println!(
-        "function, time, bound in f32; then of f32 and of f64 the bound / the worst error that was seen: of the"
+        "function, time, bound in f32; then of f32 and of f64 the bound / the worst error that was seen: of \
+        the"
     );
     println!("worst entry, and the largest of all entries");
     let bounder = Bounder::new(&model, Some(&values));

@@ -37,9 +37,9 @@ pub struct Verifier {
 /// Why a file cannot be verified.
 #[derive(Debug)]
 pub enum Error {
-    /// It cannot be read.
+    /// The file cannot be read.
     Unreadable(Unreadable),
-    /// It was generated for another arm: the hash in the file, and the arm's.
+    /// The file was generated for another arm: the hash in the file, and the arm's.
     OtherArm(String, String),
     /// The arm's model is not to be had.
     Model(model::Error),
@@ -51,8 +51,8 @@ impl fmt::Display for Error {
             Error::Unreadable(e) => e.fmt(f),
             Error::OtherArm(of_file, of_arm) => write!(
                 f,
-                "the file was generated for the arm {of_file}, and this arm is {of_arm}: generate it again, or give \
-                 the arm file that it was generated from"
+                "the file was generated for the arm {of_file}, and this arm is {of_arm}: generate it again, \
+                 or give the arm file that it was generated from"
             ),
             Error::Model(e) => e.fmt(f),
         }
@@ -299,7 +299,8 @@ fn structure(
 fn explained(mut difference: Difference, source: &Source) -> Difference {
     if let Some((line, digits)) = source.unexplained.first() {
         difference.message += &format!(
-            "; the number {digits} in line {line} looks rounded, and no line 'Rounded' of the head explains it"
+            "; the number {digits} in line {line} looks rounded, and no line 'Rounded' of the head explains \
+            it"
         );
     }
     difference
@@ -447,8 +448,8 @@ fn sum_of(point: &Point<'_>, joints: &[(usize, bool)]) -> (Fp, Fp) {
     })
 }
 
-/// Sine and cosine of each of the arm's angles at a point, by the angle itself. Which sums there are is a hint; what
-/// they are is the arm's.
+/// Sine and cosine of each of the arm's angles at a point, by the angle itself. Which sums there are is a
+/// hint; what they are is the arm's.
 fn angles(model: &Model, point: &Point<'_>, pi: Fp) -> HashMap<Fp, (Fp, Fp)> {
     let arm = model.arm();
     let residue = |x: &Rational| Fp::from_rational(x).unwrap_or(Fp::ZERO);

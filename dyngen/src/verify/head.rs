@@ -1,4 +1,5 @@
-//! What the head of a generated file says: of which arm and set it is, and what its rounded constants stand for.
+//! What the head of a generated file says: of which arm and set it is, and what its rounded constants stand
+//! for.
 
 use super::language::Exact;
 use super::{Checked, wrong};
@@ -76,8 +77,8 @@ impl Literals {
         Ok(Literals(rounded.map(meaning).collect::<Checked<_>>()?))
     }
 
-    /// What a literal stands for at `place`, a function and a name in it; what its digits say where the head says
-    /// nothing.
+    /// What a literal stands for at `place`, a function and a name in it; what its digits say where the head
+    /// says nothing.
     pub(super) fn exact(&self, digits: &str, place: &str) -> Option<Exact> {
         let value: f64 = digits.parse().ok()?;
         let of = || self.0.iter().filter(|m| m.literal == value);
@@ -88,7 +89,8 @@ impl Literals {
         }
     }
 
-    /// Whether a literal has more digits than a number that was not rounded, and the head does not explain it.
+    /// Whether a literal has more digits than a number that was not rounded, and the head does not explain
+    /// it.
     pub(super) fn is_unexplained(&self, digits: &str) -> bool {
         let plain = digits.trim_matches('0').bytes().filter(u8::is_ascii_digit).count();
         plain > 15 && digits.parse().is_ok_and(|value: f64| !self.0.iter().any(|m| m.literal == value))

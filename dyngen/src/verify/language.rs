@@ -1,7 +1,7 @@
 //! The small language in which a generated file is understood, and its values in the prime field.
 //!
-//! Straight-line code: names that are bound once, sums, products and quotients, lists, records, calls. A reader for
-//! each language of generated files lowers into it.
+//! Straight-line code: names that are bound once, sums, products and quotients, lists, records, calls. A
+//! reader for each language of generated files lowers into it.
 
 use crate::exact::prime::Fp;
 use crate::exact::rational::Rational;
@@ -263,8 +263,8 @@ impl Expr {
         Expr { line, kind: Kind::Binary('+', Box::new(product), Box::new(z)) }
     }
 
-    /// The line of the statement that gives entry (row, column) of a result of columns; the expression's own where
-    /// it is not found.
+    /// The line of the statement that gives entry (row, column) of a result of columns; the expression's own
+    /// where it is not found.
     pub(super) fn line_of_entry(&self, row: usize, column: usize) -> usize {
         let Kind::Block(lets, result) = &self.kind else { return self.line };
         let entry = match &result.kind {

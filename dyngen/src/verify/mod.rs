@@ -1,8 +1,8 @@
-//! What is printed in a generated file against the Lagrangian: the text is read back, evaluated modulo the prime at
-//! points of its own, and compared.
+//! What is printed in a generated file against the Lagrangian: the text is read back, evaluated modulo the
+//! prime at points of its own, and compared.
 //!
-//! Trusted are this folder, the Lagrangian with the algebra below it, and that a compiler does what the text says. The
-//! recursions, the optimiser and the printer are not.
+//! Trusted are this folder, the Lagrangian with the algebra below it, and that a compiler does what the text
+//! says. The recursions, the optimiser and the printer are not.
 
 mod c;
 mod check;

@@ -1,4 +1,5 @@
-//! Reads a generated file in Rust. Whatever it does not know is an error: nothing in the file stays unlooked at.
+//! Reads a generated file in Rust. Whatever it does not know is an error: nothing in the file stays unlooked
+//! at.
 
 use super::head::Literals;
 use super::language::{Exact, Expr, Kind, Let, Pattern, Routine};

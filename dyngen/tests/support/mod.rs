@@ -13,7 +13,8 @@ pub(crate) fn model(text: &str) -> Model {
     Model::derive(Arm::parse(text, "arm.toml").unwrap_or_else(|e| panic!("{e}"))).unwrap()
 }
 
-/// Every function that the arm has for a set, in the order of [`Function::ALL`]: it is proven, or this panics.
+/// Every function that the arm has for a set, in the order of [`Function::ALL`]: it is proven, or this
+/// panics.
 pub(crate) fn proven(model: &Model, kind: SetKind) -> Vec<Evaluator> {
     let evaluator = |f| Evaluator::new(model, f, kind).unwrap_or_else(|e| panic!("{f} {kind}: {e}"));
     model.functions(kind).map(evaluator).collect()

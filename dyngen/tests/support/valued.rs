@@ -33,7 +33,8 @@ joints = [5, 4]
 matrix = [[1, "1/2"], [0, 1]]
 "#;
 
-/// A model with values of its parameters that make B positive definite, and what its functions give at a state.
+/// A model with values of its parameters that make B positive definite, and what its functions give at a
+/// state.
 pub(crate) struct Arm {
     pub(crate) model: Model,
     kind: SetKind,
@@ -77,8 +78,8 @@ impl Arm {
         self.at(function, &self.state)
     }
 
-    /// The derivative of a function's result as a column by each number of a part of the state, by Richardson's
-    /// extrapolation of central differences.
+    /// The derivative of a function's result as a column by each number of a part of the state, by
+    /// Richardson's extrapolation of central differences.
     pub(crate) fn differences(&self, function: Function, part: fn(&mut State) -> &mut Vec<f64>) -> Matrix {
         let column = |j: usize| {
             let difference = |step: f64| {

@@ -1,4 +1,5 @@
-//! Two controllers of the desk arm on a simulated one: `cargo run -p control-loop`. No hardware was run with them.
+//! Two controllers of the desk arm on a simulated one: `cargo run -p control-loop`. No hardware was run with
+//! them.
 
 mod arm {
     #![allow(dead_code)]
@@ -37,7 +38,8 @@ fn guide(arm: &mut Arm, hand: f64, seconds: f64) {
     }
 }
 
-/// Along a path with small errors: the rigid arm and its feedback, and the friction of the motion that is wanted.
+/// Along a path with small errors: the rigid arm and its feedback, and the friction of the motion that is
+/// wanted.
 fn follow(arm: &mut Arm, path: impl Fn(f64) -> Reference<f64, 3>, seconds: f64) -> f64 {
     let law = ComputedTorque::for_period(PERIOD);
     let mut worst = 0.0;

@@ -4,8 +4,8 @@ use crate::{Joints, arm};
 use powerball::controller::dynamics::State;
 use powerball::controller::friction::TanhFriction;
 
-/// Time between two cycles of a controller, s. Short against inertia over the slope of friction, or what hand guiding takes
-/// off is late, and a light arm creeps.
+/// Time between two cycles of a controller, s. Short against inertia over the slope of friction, or what hand
+/// guiding takes off is late, and a light arm creeps.
 pub const PERIOD: f64 = 0.001;
 
 pub struct Arm {

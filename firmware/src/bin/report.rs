@@ -67,8 +67,8 @@ macro_rules! bits {
     }};
 }
 
-/// Cycles of a controller along a motion. From the middle on joint 2 needs 3 N·m more than its model says: in which
-/// cycle the test reports so first is printed next to the bits.
+/// Cycles of a controller along a motion. From the middle on joint 2 needs 3 N·m more than its model says: in
+/// which cycle the test reports so first is printed next to the bits.
 fn bits_of_cycles(out: &mut impl Write) {
     let values = single::prepared(&single::PARAMETERS.into());
     let mut controller = Controller::default();
@@ -169,8 +169,8 @@ macro_rules! costs {
     }};
 }
 
-/// A controller's cycle: without the test whether the model holds; all turns of a row of that test; the dearest cycle
-/// with its turn.
+/// A controller's cycle: without the test whether the model holds; all turns of a row of that test; the
+/// dearest cycle with its turn.
 #[cfg(target_os = "none")]
 fn costs_of_cycle(out: &mut impl Write, counter: &mut powerball_firmware::measure::Counter) {
     use powerball_firmware::measure::stack;

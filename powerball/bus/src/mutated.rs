@@ -112,7 +112,8 @@ fn a_driver_that_hears_nonsense_moves_nothing() {
 fn mutated_files_of_drives_are_read_or_refused() {
     const DCF: &str = "[DeviceInfo]\nBaudRate_500=1\n[1016sub1]\nDataType=7\nAccessType=rw\n[6040]\nDataType=6\n\
         AccessType=rww\nPDOMapping=1\n[1400sub1]\nDataType=7\nAccessType=rw\nDefaultValue=$NODEID+0x200\n[1003]\n\
-        ObjectType=8\nDataType=0x1B\nCompactSubObj=3\n[1003Name]\nNrOfEntries=1\n1=Newest ; of all\n[1003Value]\n\
+        ObjectType=8\nDataType=0x1B\nCompactSubObj=3\n[1003Name]\nNrOfEntries=1\n1=Newest ; of \
+        all\n[1003Value]\n\
         2=0x8130\n[A0sub1]\nDataType=5\nDefaultValue=0x10\n[2000]\nDataType=0xA0\nDefaultValue=0xFFFFFF\n\
         [DeviceComissioning]\nNodeID=5\nBaudrate=500\n";
     const ARM: &str = include_str!("../../lwa4p_bus.toml");

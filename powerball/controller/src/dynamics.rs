@@ -5,8 +5,8 @@ use nalgebra::{Matrix4, RealField, SMatrix, SVector, Vector6};
 /// Dynamics of an arm of `N` joints in SI units: B(q)·q̈ + C(q, q̇)·q̇ + g(q) = τ, with C of Christoffel
 /// symbols, so that Ḃ − 2C is skew. Friction is not part of it.
 ///
-/// For code of `dyngen` with baked-in values, [`Functions`] is the implementation; for code that takes parameters, an
-/// implementation on the struct that holds them calls the functions of the same names.
+/// For code of `dyngen` with baked-in values, [`Functions`] is the implementation; for code that takes
+/// parameters, an implementation on the struct that holds them calls the functions of the same names.
 pub trait ArmModel<T: RealField + Copy, const N: usize> {
     /// B(q), kg·m², rotors included.
     fn mass_matrix(&self, q: &SVector<T, N>) -> SMatrix<T, N, N>;

@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-/// A joint's place in its arm. It counts from 0 in memory, as slices do, and from 1 wherever it is printed or written, as
-/// people and files do.
+/// A joint's place in its arm. It counts from 0 in memory, as slices do, and from 1 wherever it is printed or
+/// written, as people and files do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct JointNumber(usize);
 

@@ -106,7 +106,8 @@ impl Prepared {
         logs
     }
 
-    /// What the explained model leaves on the logs that are like the others; `None` where that cannot be learnt.
+    /// What the explained model leaves on the logs that are like the others; `None` where that cannot be
+    /// learnt.
     fn colour(&self, explained: &Explained) -> Option<Colour> {
         let model = &explained.model;
         let changes = &model.additions.arm_changes;

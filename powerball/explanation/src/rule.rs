@@ -13,16 +13,16 @@ pub struct Rule {
     /// Effects added at most.
     pub most_steps: usize,
 
-    /// Least score of an effect, in units of χ²: e^(−10/2) is a likelihood ratio of 150 after the penalties. An
-    /// experiment must promise it, and a log has the payload or the push of another one where that explains
-    /// so much more.
+    /// Least score of an effect, in units of χ²: e^(−10/2) is a likelihood ratio of 150 after the penalties.
+    /// An experiment must promise it, and a log has the payload or the push of another one where that
+    /// explains so much more.
     pub least_score: f64,
     /// Penalty for each coefficient: what one coefficient gains by chance, twice over (Akaike). A
     /// setting is refined for more than half of it.
     pub per_coefficient: f64,
-    /// Probability of accepting anything at all where nothing is missing, over all joints and candidates; above
-    /// the band that of a ripple, over all joints and orders; that of a wrong decision between two names by an
-    /// experiment. A candidate must exceed all but this share of its time-shift surrogates.
+    /// Probability of accepting anything at all where nothing is missing, over all joints and candidates;
+    /// above the band that of a ripple, over all joints and orders; that of a wrong decision between two
+    /// names by an experiment. A candidate must exceed all but this share of its time-shift surrogates.
     pub family_wise: f64,
     /// The held-out squared error must fall by this share on average over folds: 1 % of the rms, below which
     /// no user would notice. A signal that explains less of a residual's variance is not reported.
@@ -38,7 +38,8 @@ pub struct Rule {
     /// … where either way adds the same: their correlation.
     pub least_correlation: f64,
     /// The zeros of torque sensors are in the model from the start where this many joints gain
-    /// [`large_gain`](Self::large_gain) by them, both ways round: one joint alone is an effect like any other.
+    /// [`large_gain`](Self::large_gain) by them, both ways round: one joint alone is an effect like any
+    /// other.
     pub joints_with_zeros: usize,
     /// Blocks that count as independent last this many autocorrelation times of what is left …
     pub block_memories: f64,
@@ -47,21 +48,22 @@ pub struct Rule {
     /// … and not more, s.
     pub longest_block: f64,
 
-    /// Share of its time-shift surrogates whose score an event of some seconds must exceed: shifted in time it
-    /// falls onto others of its kind for at most a quarter of a log.
+    /// Share of its time-shift surrogates whose score an event of some seconds must exceed: shifted in time
+    /// it falls onto others of its kind for at most a quarter of a log.
     pub event_surrogate_level: f64,
     /// Surrogates of a step, and those that state the false-positive rate.
     pub surrogates: usize,
-    /// Those for which a search is done again: an effect's for logs and times, that for ripple above the band.
+    /// Surrogates for which a search is done again: an effect's for logs and times, that for ripple above the
+    /// band.
     pub searched_surrogates: usize,
     /// A shifted column that still correlates so much with the unshifted one (a periodic motion) is no
     /// surrogate.
     pub surrogate_correlation: f64,
 
-    /// A term of the class of an accepted one, on the same joint, that gains less than this share of it corrects
-    /// that one's law and is no effect of its own.
+    /// A term of the class of an accepted one, on the same joint, that gains less than this share of it
+    /// corrects that one's law and is no effect of its own.
     pub only_corrects_class: f64,
-    /// The same for a term of another class: laws are wrong by a few percent, and that shows in any guise.
+    /// That share for a term of another class: laws are wrong by a few percent, and that shows in any guise.
     pub only_corrects_any: f64,
     /// Two events this close count as one whose time is a little off, s.
     pub same_event: f64,
@@ -83,8 +85,8 @@ pub struct Rule {
     /// share is that of an earlier trial on other data. What is in validation logs only must leave no more of
     /// their excess over the fitted logs.
     pub max_unexplained: f64,
-    /// Half, and more than it is most. An event of some seconds (a push) must explain most of what its time has
-    /// more of squared error than others; another log has the same push where it has it for most of its
+    /// Half, and more than it is most. An event of some seconds (a push) must explain most of what its time
+    /// has more of squared error than others; another log has the same push where it has it for most of its
     /// time; an effect most of which is missing in some octave, by more than
     /// [`missing_errors`](Self::missing_errors), is not the effect that it is called.
     pub most: f64,
@@ -122,8 +124,8 @@ pub struct Rule {
     /// A joint is predicted where no more than this share of its torque's rms is left on the validation set.
     /// Where no more than this share is not left, a model predicts next to nothing.
     pub predicted_share: f64,
-    /// What is left of a joint below this share of its torque needs no name, whatever it depends on: a law that is missing
-    /// often leaves less than [`predicted_share`](Self::predicted_share).
+    /// What is left of a joint below this share of its torque needs no name, whatever it depends on: a law
+    /// that is missing often leaves less than [`predicted_share`](Self::predicted_share).
     pub little_share: f64,
 
     /// Below this time of motion a reader is warned that the folds are too short to tell much, s.

@@ -1,9 +1,9 @@
 //! Simulation of an arm that moves by a torque model, under a control law that uses the same model or another
 //! one.
 //!
-//! B(q)·q̈ + C·q̇ + g + friction + effects = τ, with a zero-order hold of τ over a cycle. Each of ten steps a cycle is
-//! linearly implicit in Eq. 16: friction is s·q̇' against the new velocity q̇', with s = f(q̇')/q̇' found by iteration, so that
-//! a joint sticks without chatter. Effects are taken at the old velocity.
+//! B(q)·q̈ + C·q̇ + g + friction + effects = τ, with a zero-order hold of τ over a cycle. Each of ten steps a
+//! cycle is linearly implicit in Eq. 16: friction is s·q̇' against the new velocity q̇', with s = f(q̇')/q̇'
+//! found by iteration, so that a joint sticks without chatter. Effects are taken at the old velocity.
 
 use super::torque_model::{ModelFile, ModelOnArm};
 use dyngen::Arm;
@@ -118,7 +118,8 @@ macro_rules! with_joints {
     (@ $dof:expr, $n:ident => $body:expr, $($joints:literal)+) => {
         match $dof {
             $($joints => { const $n: usize = $joints; $body })+
-            other => Err(SimulateError::Input(format!("the arm has {other} joints, 1 to 7 can be simulated"))),
+            other => Err(SimulateError::Input(format!("the arm has {other} joints, 1 to 7 can be \
+                simulated"))),
         }
     };
 }
@@ -150,8 +151,8 @@ fn controller<'a, E, const N: usize>(
         let pole = largest_pole(&inertia, &stiffness, &damping, path.period);
         if !pole.is_stable() {
             return Err(SimulateError::Input(format!(
-                "these gains are not stable at {:.0} Hz: the largest pole of the sampled loop is {:.4} where the path begins, \
-                    and must be below 1. Take a lower bandwidth, or damping above 0",
+                "these gains are not stable at {:.0} Hz: the largest pole of the sampled loop is {:.4} where \
+                    the path begins, and must be below 1. Take a lower bandwidth, or damping above 0",
                 1.0 / path.period,
                 pole.0
             )));
@@ -305,7 +306,8 @@ mod tests {
     use super::*;
 
     /// A pendulum of 2 kg at 0.5 m, in a plane with gravity along −y.
-    const ARM: &str = "name = \"pendulum\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n[[joint]]\nkind = \"revolute\"\n\
+    const ARM: &str = "name = \"pendulum\"\nconvention = \"standard\"\ngravity = [0, -9.81, \
+        0]\n[[joint]]\nkind = \"revolute\"\n\
         a = 0.5\nalpha = 0\nd = 0\ntheta = 0\n";
     const INERTIA: f64 = 0.5;
     const WEIGHT: f64 = 9.81;
@@ -371,7 +373,8 @@ mod tests {
         );
     }
 
-    /// Dry friction holds what is less than it, and constant torque against viscous friction ends at their quotient.
+    /// Dry friction holds what is less than it, and constant torque against viscous friction ends at their
+    /// quotient.
     #[test]
     fn a_joint_sticks_and_reaches_its_speed() {
         let gravity = |q: f64| WEIGHT * q.cos();

@@ -4,7 +4,8 @@ use dyngen::{Error, Evaluator, Function, Model, Samples, SetKind};
 use nalgebra::{SMatrix, SVector};
 use powerball_controller::dynamics::ArmModel;
 
-/// The rigid dynamics of an arm of `N` joints with values of its minimal set, evaluated and not compiled: some 10 µs a call.
+/// The rigid dynamics of an arm of `N` joints with values of its minimal set, evaluated and not compiled:
+/// some 10 µs a call.
 #[derive(Clone, Debug)]
 pub struct NumericArm<const N: usize> {
     inertia: Evaluator,

@@ -60,7 +60,7 @@ impl<'a> Source<'a> {
         Source { map, ..self }
     }
 
-    /// Its name in messages: the file, or the log's own name.
+    /// The log's name in messages: the file, or the log's own name.
     #[must_use]
     pub fn name(&self) -> String {
         match &self.input {

@@ -61,9 +61,9 @@ impl Findings<'_> {
         }
         if self.indefinite > INDEFINITE {
             reasons.push(format!(
-                "the mass matrix B(q) of these values is not positive definite at {:.0} % of the poses: no real arm has \
-                 them, and forward dynamics with them is useless; consistent.json has the nearest possible \
-                 values",
+                "the mass matrix B(q) of these values is not positive definite at {:.0} % of the poses: no \
+                 real arm has them, and forward dynamics with them is useless; consistent.json has the \
+                 nearest possible values",
                 100.0 * self.indefinite
             ));
         }

@@ -100,7 +100,8 @@ impl Chain {
         &self.rows
     }
 
-    /// The velocity, or acceleration, of a joint's motor on the joint's side of its gear, for those of all joints.
+    /// The velocity, or acceleration, of a joint's motor on the joint's side of its gear, for those of all
+    /// joints.
     pub fn motor_rate(&self, motor: usize, rates: &[f64]) -> f64 {
         match &self.motors {
             None => rates[motor],

@@ -360,7 +360,7 @@ impl Stage {
 /// What must follow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Expected {
-    /// It does no harm: the arm comes to run, runs on, or comes to rest as commanded.
+    /// The fault does no harm: the arm comes to run, runs on, or comes to rest as commanded.
     GoesOn,
     /// Quick stop reaches every drive within this many cycles, the cause is latched.
     Stops { cycles: u64 },

@@ -36,8 +36,8 @@ fn with_wire(control: ControlMode, wire: Wire) -> World {
     world
 }
 
-/// The set-points swing by 0.1 rad from end to end, with a period of 3.1 s: the time is that in which they have gone
-/// farther than the following error that may be.
+/// The set-points swing by 0.1 rad from end to end, with a period of 3.1 s: the time is that in which they
+/// have gone farther than the following error that may be.
 #[test]
 fn a_brake_that_closes_on_a_moving_joint_stops_the_arm() {
     for control in [ControlMode::InterpolatedPosition, ControlMode::ProfilePosition, ControlMode::Velocity] {

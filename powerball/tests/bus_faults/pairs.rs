@@ -1,7 +1,8 @@
-//! Every two things, one after the other, that can happen to an arm that runs, is ready or is faulted, in every mode:
-//! faults, and acts of the caller. What walks find by chance in long histories is here looked at in all short ones, for
-//! the same three things: nothing that moves after a latched cause, a stop of every drive soon after every cause, no
-//! set-point beyond a joint's limits. In the end the caller tries to enable without acknowledging.
+//! Every two things, one after the other, that can happen to an arm that runs, is ready or is faulted, in
+//! every mode: faults, and acts of the caller. What walks find by chance in long histories is here looked at
+//! in all short ones, for the same three things: nothing that moves after a latched cause, a stop of every
+//! drive soon after every cause, no set-point beyond a joint's limits. In the end the caller tries to enable
+//! without acknowledging.
 
 use crate::faults::Fault;
 use crate::walks::Walk;
@@ -73,7 +74,8 @@ fn arm(control: ControlMode, phase: Phase) -> Walk {
     walk
 }
 
-/// The pairs from one phase in one mode that are asked for by their numbers; the share of them that latched a cause.
+/// The pairs from one phase in one mode that are asked for by their numbers; the share of them that latched a
+/// cause.
 fn pairs(control: ControlMode, phase: Phase, asked: impl Fn(usize, usize) -> bool) -> f64 {
     let begin = arm(control, phase);
     let (mut latched, mut all) = (0, 0);

@@ -18,7 +18,8 @@ fn a_drive_that_does_not_watch_the_master_is_not_enabled() {
     }
 }
 
-/// A profile without `sync_timeout_factor` asks for no object of SCHUNK's, and still has the drives watch the master.
+/// A profile without `sync_timeout_factor` asks for no object of SCHUNK's, and still has the drives watch the
+/// master.
 #[test]
 fn drives_of_another_maker_run_without_schunks_objects() {
     let profile = Profile { sync_timeout_factor: None, ..LWA4P };

@@ -1,6 +1,6 @@
-//! Random walks: faults, acts of the caller and repairs in any order and at any time, in all modes. Whatever came
-//! before, on the wire three things hold: nothing that moves after a latched cause until the caller enables again; a
-//! stop of every drive soon after every cause; no set-point beyond a joint's limits.
+//! Random walks: faults, acts of the caller and repairs in any order and at any time, in all modes. Whatever
+//! came before, on the wire three things hold: nothing that moves after a latched cause until the caller
+//! enables again; a stop of every drive soon after every cause; no set-point beyond a joint's limits.
 
 use crate::faults::Fault;
 use crate::world::{CYCLE, VICTIM, World};
@@ -13,8 +13,8 @@ use rand::{RngExt, SeedableRng};
 
 const SEEDS: u64 = 16;
 const STEPS: usize = 40;
-/// A stop has reached all drives by then: the slowest cell of the matrix, and the frames' time on the wire. Counted
-/// from when the driver knows its cause.
+/// A stop has reached all drives by then: the slowest cell of the matrix, and the frames' time on the wire.
+/// Counted from when the driver knows its cause.
 const STOPPED: Micros = 2 * CYCLE;
 /// A frame that was queued before may be on the wire for this long.
 const WIRE: Micros = 2_500;
@@ -102,7 +102,8 @@ impl Walk {
                     self.causes.push(now);
                     self.done.push(format!("{now}: {cause}"));
                     let live = matches!(before.0, Phase::Enabling | Phase::Running);
-                    // A queue that is full, or a bus that is off, carries no stop; a silent node tells nobody.
+                    // A queue that is full, or a bus that is off, carries no stop; a silent node tells
+                    // nobody.
                     let carries = now >= self.world.full_until && !matches!(cause, Cause::BusOff);
                     if live && carries {
                         self.must_stop(now);

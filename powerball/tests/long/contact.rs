@@ -1,5 +1,5 @@
-//! How soon `follow --stop-at-contact` sees a push on the virtual arm, over the bus at 200 Hz, and how often it is wrong; with a
-//! constant threshold for comparison. The study of docs/control.md is the ignored test.
+//! How soon `follow --stop-at-contact` sees a push on the virtual arm, over the bus at 200 Hz, and how often
+//! it is wrong; with a constant threshold for comparison. The study of docs/control.md is the ignored test.
 
 use chacha20::ChaCha8Rng;
 use dyngen::{Arm, SetKind};

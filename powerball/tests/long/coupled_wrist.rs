@@ -1,8 +1,8 @@
-//! An arm whose last two motors both turn with both wrist joints, as the motors of a differential do: its friction is
-//! on the motors, and what is identified, judged and generated is that.
+//! An arm whose last two motors both turn with both wrist joints, as the motors of a differential do: its
+//! friction is on the motors, and what is identified, judged and generated is that.
 //!
-//! The logs are the virtual arm's, whose Newton–Euler recursion and friction on motors share no formula with what is
-//! tested.
+//! The logs are the virtual arm's, whose Newton–Euler recursion and friction on motors share no formula with
+//! what is tested.
 
 use chacha20::ChaCha8Rng;
 use dyngen::Arm;
@@ -107,8 +107,8 @@ fn friction_of_coupled_motors_is_found_and_judged_on_them() {
     assert!(wrong[4] > 5.0 * left[4] && wrong[5] > 5.0 * left[5], "{wrong:?} {left:?}");
 }
 
-/// The generated controller gives the joints' torques, friction on motors among them, and so does the model of which
-/// it was made: both against the noise-free arm.
+/// The generated controller gives the joints' torques, friction on motors among them, and so does the model
+/// of which it was made: both against the noise-free arm.
 #[test]
 fn the_controllers_torques_are_those_of_the_joints() {
     let quiet = Sensors {
@@ -122,7 +122,8 @@ fn the_controllers_torques_are_those_of_the_joints() {
     let found = identify(&arm, &logs, [], &IdentifyOptions::default()).unwrap();
     let text = serde_json::to_string(&found).unwrap();
     let mut model = TorqueModel::parse(&text, Path::new("identified.json")).unwrap();
-    // What the encoders of the wrist's motors show too much: a joint's is half their sum, half their difference.
+    // What the encoders of the wrist's motors show too much: a joint's is half their sum, half their
+    // difference.
     let [fifth, sixth] = [0.03, -0.01];
     model.additions.log_changes.encoder_offset = vec![0.0, 0.0, 0.0, 0.0, fifth, sixth];
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("coupled_wrist");

@@ -1,4 +1,5 @@
-//! Tests that take tens of seconds each on one core. They are one program, so that they run next to each other.
+//! Tests that take tens of seconds each on one core. They are one program, so that they run next to each
+//! other.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 

@@ -1,5 +1,6 @@
-//! Current mode with things going wrong: a joint whose encoder, drive or brake does not do what it should stops the arm before
-//! it has gone far, whatever law holds it. Makes the table of docs/results/torque_mode.md:
+//! Current mode with things going wrong: a joint whose encoder, drive or brake does not do what it should
+//! stops the arm before it has gone far, whatever law holds it. Makes the table of
+//! docs/results/torque_mode.md:
 //! `cargo test --release -p powerball --test torque_mode -- --ignored --nocapture`.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test's helpers may stop the test")]
@@ -297,7 +298,8 @@ fn the_page_holds(table: &str) {
     }
 }
 
-/// A tenth of a joint's data is lost, or one velocity is no velocity: the run goes on to its end, near its path.
+/// A tenth of a joint's data is lost, or one velocity is no velocity: the run goes on to its end, near its
+/// path.
 #[test]
 fn lost_data_is_carried_on_and_one_impossible_velocity_is_not_used() {
     for name in ["torque", "impedance"] {
@@ -315,8 +317,8 @@ fn lost_data_is_carried_on_and_one_impossible_velocity_is_not_used() {
     }
 }
 
-/// Drives with effects of `names` that the model lacks, `seeds` times each, and a model whose friction is wrong by a fifth: how
-/// many runs, and which of them were stopped.
+/// Drives with effects of `names` that the model lacks, `seeds` times each, and a model whose friction is
+/// wrong by a fifth: how many runs, and which of them were stopped.
 fn false_stops(law_name: &str, names: &[&str], seeds: u64) -> (usize, Vec<String>) {
     let (path, plant) = (path(1.0), lwa4p::plant().unwrap());
     let (mut runs, mut stops) = (0, Vec::new());

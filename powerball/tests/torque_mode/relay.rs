@@ -1,5 +1,6 @@
-//! The virtual arm behind a relay that changes frames of one joint from a moment on, and a record of where the arm truly was.
-//! It stands on the bus in memory, where a multicast relay would stand between two programs.
+//! The virtual arm behind a relay that changes frames of one joint from a moment on, and a record of where
+//! the arm truly was. The relay stands on the bus in memory, where a multicast relay would stand between two
+//! programs.
 
 use powerball::bus::canopen::{Cob, Frame, Micros, NodeId};
 use powerball::bus::cia402::{Command, Controlword};

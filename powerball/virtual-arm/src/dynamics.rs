@@ -40,7 +40,8 @@ impl Dynamics {
         &self.chain
     }
 
-    /// The way of joint `joint` that is drawn where a turning joint turns by 1 rad: 1 rad, or 0.2 m for a sliding one.
+    /// The way of joint `joint` that is drawn where a turning joint turns by 1 rad: 1 rad, or 0.2 m for a
+    /// sliding one.
     pub fn usual_way(&self, joint: usize) -> f64 {
         if self.chain.rows()[joint].is_revolute() { 1.0 } else { 0.2 }
     }
@@ -172,8 +173,8 @@ impl Dynamics {
 
             // Rotor i sits on link i−1 and spins about the joint's axis with the angular momentum k·Im·μ·z
             // more than link i−1 gives it, μ its motor's velocity before the gear: q̇, or what a transmission
-            // makes of several joints' q̇. Its rate of change is a moment on link i−1 (frame i−1 here), and its
-            // share in the rotor's own equation of motion, times k, comes onto the joints that turn it.
+            // makes of several joints' q̇. Its rate of change is a moment on link i−1 (frame i−1 here), and
+            // its share in the rotor's own equation of motion, times k, comes onto the joints that turn it.
             let spin = row.ratio() * body.rotor;
             if spin != 0.0 {
                 let (rate, change) = (self.chain.motor_rate(i, pass.dq), self.chain.motor_rate(i, pass.ddq));

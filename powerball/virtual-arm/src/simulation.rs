@@ -186,8 +186,8 @@ impl Simulation {
         (0..self.dof()).map(|i| [self.dq[i], self.velocity(i)]).collect()
     }
 
-    /// The new velocities of links and motors, and the links' accelerations, where friction on either side is an
-    /// offset plus a slope times the new velocity. `None` stops the arm.
+    /// The new velocities of links and motors, and the links' accelerations, where friction on either side is
+    /// an offset plus a slope times the new velocity. `None` stops the arm.
     fn solve(
         &mut self,
         h: f64,
@@ -256,8 +256,8 @@ impl Simulation {
         if self.brakes[joint] { BRAKE / self.velocity(joint).abs().max(BRAKE_CREEP) } else { 0.0 }
     }
 
-    /// Torques against the motion, N·m, at given velocities: of the effects that rub, on the links' side, and of
-    /// Eq. 16, on the motors'.
+    /// Torques against the motion, N·m, at given velocities: of the effects that rub, on the links' side, and
+    /// of Eq. 16, on the motors'.
     fn friction(&self, velocities: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let mut rubbing = vec![0.0; self.dof()];
         if self.plant.effects().iter().any(|effect| effect.rubs_at().is_some()) {
@@ -321,8 +321,8 @@ pub struct Gains {
     pub integral: f64,
     /// Torque at the current limit, N·m.
     pub limit: f64,
-    /// Coulomb friction that is fed forward with the sign of the wanted velocity, N·m: without it a joint dwells
-    /// at each reversal until the integrator has turned round.
+    /// Coulomb friction that is fed forward with the sign of the wanted velocity, N·m: without it a joint
+    /// dwells at each reversal until the integrator has turned round.
     pub friction: f64,
 }
 

@@ -57,8 +57,8 @@ class Rule:
     event_surrogate_level: float = 0.75
     #: Surrogates of a step, and those that state the false-positive rate.
     surrogates: int = 2000
-    #: Those for which a search is done again: an effect's for logs and times, that for ripple above the
-    #: band.
+    #: Surrogates for which a search is done again: an effect's for logs and times, that for ripple above
+    #: the band.
     searched_surrogates: int = 200
     #: A shifted column that still correlates so much with the unshifted one (a periodic motion) is no
     #: surrogate.
@@ -66,7 +66,7 @@ class Rule:
     #: A term of the class of an accepted one, on the same joint, that gains less than this share of it
     #: corrects that one's law and is no effect of its own.
     only_corrects_class: float = 0.15
-    #: The same for a term of another class: laws are wrong by a few percent, and that shows in any guise.
+    #: That share for a term of another class: laws are wrong by a few percent, and that shows in any guise.
     only_corrects_any: float = 0.05
     #: Two events this close count as one whose time is a little off, s.
     same_event: float = 2.0

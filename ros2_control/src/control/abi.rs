@@ -107,7 +107,8 @@ pub unsafe extern "C" fn powerball_control_close(control: *mut Handle) {
 /// See [`Control::start`].
 ///
 /// # Safety
-/// `control` is null or an open control that nobody else uses now; `position` is null or has a number for each joint.
+/// `control` is null or an open control that nobody else uses now; `position` is null or has a number for
+/// each joint.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn powerball_control_start(control: *mut Handle, position: *const f64) -> c_int {
     // SAFETY: the caller's promise.
@@ -123,7 +124,8 @@ pub unsafe extern "C" fn powerball_control_start(control: *mut Handle, position:
 /// See [`Control::update`].
 ///
 /// # Safety
-/// `control` is null or an open control that nobody else uses now; each array is null or has a number for each joint.
+/// `control` is null or an open control that nobody else uses now; each array is null or has a number for
+/// each joint.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn powerball_control_update(
     control: *mut Handle,

@@ -109,7 +109,7 @@ impl<const N: usize> Memory<N> {
         }))
     }
 
-    /// It remembers nothing yet.
+    /// Resets what the model remembers.
     pub(super) fn begin(&mut self) {
         if let Some((room, begin, _)) = &mut self.0 {
             // SAFETY: the promise of `open`: a model has room here, and nobody else uses it.

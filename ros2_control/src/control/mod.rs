@@ -185,8 +185,8 @@ fn computed_torque<const N: usize>(
         return Ok(law);
     }
     Err(format!(
-        "a bandwidth of {} rad/s with a damping ratio of {} is unstable at {} Hz and a cycle of delay (largest pole {:.3}): \
-         take less, {:.3} rad/s by default",
+        "a bandwidth of {} rad/s with a damping ratio of {} is unstable at {} Hz and a cycle of delay \
+         (largest pole {:.3}): take less, {:.3} rad/s by default",
         law.proportional.max().sqrt(),
         options.damping,
         1.0 / options.period,

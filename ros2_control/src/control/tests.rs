@@ -94,7 +94,8 @@ fn refusal(arm: &ArmFunctions, options: &COptions) -> String {
     CStr::from_bytes_until_nul(&why).unwrap().to_str().unwrap().to_string()
 }
 
-/// The pendulum under a control for some seconds from rest at 0.3 rad, pushed by some N·m: position and external torque.
+/// The pendulum under a control for some seconds from rest at 0.3 rad, pushed by some N·m: position and
+/// external torque.
 fn run(law: c_int, reference: Option<f64>, push: f64, seconds: f64) -> [f64; 2] {
     let (mut q, mut dq, mut effort, mut external) = (0.3, 0.0, 0.0, 0.0);
     // SAFETY: all point to what they say; one number each.
@@ -169,7 +170,8 @@ unsafe extern "C" fn gravity_of_nothing(_: *const f64, result: *mut f64) -> c_in
     0
 }
 
-/// A state that is no number, or a cycle before the start: nothing is written. A reference that is none holds.
+/// A state that is no number, or a cycle before the start: nothing is written. A reference that is none
+/// holds.
 #[test]
 fn a_cycle_without_numbers_writes_nothing() {
     let (nan, one) = (f64::NAN, 1.0);

@@ -37,7 +37,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let Arguments { draws, pairs, .. } = arguments;
     let _ = write!(
         page,
-        "\nMade by `cargo run --release -p xtask -- known-truth --draws {draws} --pairs {pairs}`; draws are seeded by their number.\n"
+        "\nMade by `cargo run --release -p xtask -- known-truth --draws {draws} --pairs {pairs}`; draws are \
+        seeded by their number.\n"
     );
     if let Some(folder) = arguments.write.parent() {
         fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
@@ -47,11 +48,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
 
 const HEAD: &str = "# Measured logs with a known truth
 
-What a program reports about a robot is easily believed. Here it is asked about logs of real arms in which something is whose owners, or a seeded draw, say what it
-is. The answers are those of `powerball explain` with its defaults. *Before* and *after* are errors on the validation logs in percent of each joint's torque, of the base model
-and with all that was found; the textbook fit has Coulomb, viscous and constant friction. PySINDy is what sparse regression leaves where it searches a textbook's residual for a law: all
-products of two of 1, sin q, cos q, velocities, accelerations and their signs of all joints (`benches/sindy.py`, with Pinocchio's regressor; a base model and
-filters of its own, which is why its figures without a term differ a little from the textbook's). A sum over states has no words for \"a mass on link 2 in this log\" or
+What a program reports about a robot is easily believed. Here it is asked about logs of real arms in which \
+something is whose owners, or a seeded draw, say what it
+is. The answers are those of `powerball explain` with its defaults. *Before* and *after* are errors on the \
+validation logs in percent of each joint's torque, of the base model
+and with all that was found; the textbook fit has Coulomb, viscous and constant friction. PySINDy is what \
+sparse regression leaves where it searches a textbook's residual for a law: all
+products of two of 1, sin q, cos q, velocities, accelerations and their signs of all joints \
+(`benches/sindy.py`, with Pinocchio's regressor; a base model and
+filters of its own, which is why its figures without a term differ a little from the textbook's). A sum over \
+states has no words for \"a mass on link 2 in this log\" or
 \"a push from 4.4 s on\"; its terms follow the path on which they were found, and off it they do harm.
 
 ";

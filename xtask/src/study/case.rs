@@ -61,7 +61,8 @@ impl Table {
         matches!(self, Table::Arms | Table::CleanArms) || self.draws_logs()
     }
 
-    /// Whether friction's law, the torques' zeros, noise, and rate, number and length of the logs are drawn too.
+    /// Whether friction's law, the torques' zeros, noise, and rate, number and length of the logs are drawn
+    /// too.
     pub(super) fn draws_logs(self) -> bool {
         matches!(self, Table::Drawn | Table::CleanDrawn)
     }
@@ -94,7 +95,8 @@ impl Table {
             Table::Arms => "one effect of size 0.3 to 1.5 on arms drawn by lot, white noise",
             Table::CleanArms => "no effect, arms drawn by lot, white noise",
             Table::Drawn => {
-                "two effects as they were drawn, of size 0.5 and more, half of them on one joint; arms and logs drawn by lot"
+                "two effects as they were drawn, of size 0.5 and more, half of them on one joint; arms and \
+                logs drawn by lot"
             }
             Table::CleanDrawn => "no effect, arms and logs drawn by lot",
         }

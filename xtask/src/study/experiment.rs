@@ -168,7 +168,8 @@ impl Bench {
         Ok(Some(Outcome { refined, ..outcome }))
     }
 
-    /// What a case's logs are made of; `None` where no truth of its kind can be seen on the arm that was drawn.
+    /// What a case's logs are made of; `None` where no truth of its kind can be seen on the arm that was
+    /// drawn.
     fn recorded(&self, case: &Case) -> Result<Option<Recorded>, String> {
         let mut rng = case.rng();
         let mut session = self.session(case, &mut rng)?;
@@ -296,9 +297,9 @@ impl Bench {
         Ok(misfit)
     }
 
-    /// A truth of that kind and the size that it reached: visible size `size`, or at least that where it stays as it
-    /// was drawn. `None` where the arm has none. It sits on joint `on` where an arm that was drawn is given
-    /// one and the kind is of one joint.
+    /// A truth of that kind and the size that it reached: visible size `size`, or at least that where it
+    /// stays as it was drawn. `None` where the arm has none. It sits on joint `on` where an arm that was
+    /// drawn is given one and the kind is of one joint.
     fn truth(
         &self,
         session: &Session,

@@ -1,7 +1,7 @@
 //! The probability of a name as a curve, fitted to one half of the cases and judged on the other.
 //!
-//! Logistic regression on what `explain` knows of a name (D. R. Cox, "The regression analysis of binary sequences", 1958),
-//! by Newton's method with a small ridge.
+//! Logistic regression on what `explain` knows of a name (D. R. Cox, "The regression analysis of binary
+//! sequences", 1958), by Newton's method with a small ridge.
 
 use super::judge::{Named, Outcome};
 use super::reliability::wilson;
@@ -100,8 +100,8 @@ fn curve(fit: &[Case], judge: &[Case]) -> String {
     out.push_str(&reliability(judge, &curve));
     let _ = writeln!(
         out,
-        "\nBrier score on the {} names that were not fitted: {:.4}; of the curve in use {:.4}; of three constants {:.4}; of \
-         one, the share of the other half, {:.4}",
+        "\nBrier score on the {} names that were not fitted: {:.4}; of the curve in use {:.4}; of three \
+         constants {:.4}; of one, the share of the other half, {:.4}",
         judge.len(),
         brier(judge, &curve),
         brier(judge, &|case| case.evidence.probability()),

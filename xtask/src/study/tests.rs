@@ -29,7 +29,8 @@ fn a_zero_is_no_spring() {
     );
 }
 
-/// Nor does a base model that lacks something: once its tilt and its warmth are known, the log to judge on needs no body.
+/// Nor does a base model that lacks something: once its tilt and its warmth are known, the log to judge on
+/// needs no body.
 #[test]
 fn what_lacks_an_effect_is_no_body_in_the_log_to_judge_on() {
     let names = names(Table::Drawn, 127);

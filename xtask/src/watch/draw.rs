@@ -97,7 +97,8 @@ pub(super) fn changed(
     let place = rng.random_range(0.3..0.6);
     let from = if name == "encoder_offset" { 0 } else { (clean.t.len() as f64 * place) as usize };
     let by = if name == "encoder_offset" {
-        // The log shows the true torque at another place: the same size of torque as that place's would differ by.
+        // The log shows the true torque at another place: the same size of torque as that place's would
+        // differ by.
         offset_of_size(plant, motion, kind.joint, size)
     } else {
         let mut by = if name == "contact_wrench" { 5.0 } else { 0.05 };
@@ -128,7 +129,8 @@ fn share(log: &Log, clean: &Log, from: usize) -> (usize, f64) {
     (0..log.torque.len()).map(|j| (j, of(j))).fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a })
 }
 
-/// The offset of a joint's zero by which the torque at the place that is logged differs by a share of a joint's.
+/// The offset of a joint's zero by which the torque at the place that is logged differs by a share of a
+/// joint's.
 fn offset_of_size(plant: &Plant, motion: &Motion, joint: usize, size: f64) -> f64 {
     let n = motion.dof();
     let torques = |by: f64| -> Vec<Vec<f64>> {

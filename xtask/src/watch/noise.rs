@@ -1,4 +1,5 @@
-//! False alarms: noise of the model's colour along the rows of a log, again and again, with friction that wanders.
+//! False alarms: noise of the model's colour along the rows of a log, again and again, with friction that
+//! wanders.
 
 use super::Arguments;
 use chacha20::ChaCha8Rng;

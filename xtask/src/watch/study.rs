@@ -57,14 +57,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), String> {
         }
     }
     println!(
-        "draws; within {SOON} s for one who knows the change; within {SOON} s; seen; named right; events before"
+        "draws; within {SOON} s for one who knows the change; within {SOON} s; seen; named right; events \
+        before"
     );
     for (kind, tally) in &mut tallies {
         let Tally { draws, possible, soon, seen, right, early, delays } = tally;
         delays.sort_by(f64::total_cmp);
         let median = delays.get(delays.len() / 2).unwrap_or(&f64::NAN);
         println!(
-            "{kind}: {draws}; {possible}; {soon}; {seen}; {right}; {early}; median of those seen {median:.2} s"
+            "{kind}: {draws}; {possible}; {soon}; {seen}; {right}; {early}; median of those seen {median:.2} \
+            s"
         );
     }
     noise::run(arguments, &body, &model, &recorded[3]);
@@ -97,9 +99,9 @@ fn count(tally: &mut Tally, kind: &str, change: &Changed, body: &RigidArm, model
     after.for_each(|more| println!("  {kind} on {joint} at {at:.2}: then {}", more.sentence()));
 }
 
-/// How long it takes one who knows the change, when it begins and that the noise is normal: the likelihood ratio of the
-/// innovations with the change and without exceeds the level. No test with the same rate of false alarms is sooner on
-/// average.
+/// How long it takes one who knows the change, when it begins and that the noise is normal: the likelihood
+/// ratio of the innovations with the change and without exceeds the level. No test with the same rate of
+/// false alarms is sooner on average.
 fn oracle(change: &Changed, body: &RigidArm, model: &TorqueModel, level: f64) -> Option<f64> {
     let colour = model.colour.as_ref()?;
     let rows = |log: &Log| {

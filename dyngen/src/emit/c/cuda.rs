@@ -55,12 +55,16 @@ typedef unsigned long long uint64_t;
 /// The comment at the head; `rounded` are the lines of constants.
 fn head(names: &Names, model: &Model, options: &Options, rounded: &[String]) -> String {
     let needs = [
-        "Needs: CUDA (nvcc or NVRTC) with --fmad=false, which gives the bits of the file in C. Without it products",
+        "Needs: CUDA (nvcc or NVRTC) with --fmad=false, which gives the bits of the file in C. Without it \
+        products",
         "and sums are contracted, and results differ in their last digits.",
-        "Every function is proven equal to the Lagrangian of the arm; none allocates. Matrices are arrays of rows:",
+        "Every function is proven equal to the Lagrangian of the arm; none allocates. Matrices are arrays of \
+        rows:",
         "result[i][j].",
-        "Kernels end in _batch: one thread a state, in a grid of one dimension. Arrays over count states are one",
-        "behind the other: entry k of state s is at [k * count + s], entries of matrices row by row. The parameters",
+        "Kernels end in _batch: one thread a state, in a grid of one dimension. Arrays over count states are \
+        one",
+        "behind the other: entry k of state s is at [k * count + s], entries of matrices row by row. The \
+        parameters",
         "are one array for all states. A result may be written over an argument of the same length.",
     ];
     let lines = docs::head_lines(model, options, &needs, &fused::CUDA);

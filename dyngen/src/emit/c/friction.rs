@@ -58,7 +58,8 @@ fn matrix(names: &Names, motors: &[Vec<f64>]) -> Item {
     };
     Item::Constants {
         doc: format!(
-            "Motor i turns at the sum over joints j of `{prefix}_motor_velocities[i][j]` times their velocities, on the\n\
+            "Motor i turns at the sum over joints j of `{prefix}_motor_velocities[i][j]` times their \
+            velocities, on the\n\
              joint's side of its gear."
         ),
         declared: format!("const double {prefix}_motor_velocities[{upper}_JOINTS][{upper}_JOINTS]"),

@@ -10,8 +10,9 @@ use crate::graph::{Input, Preparation};
 use crate::model::Model;
 use std::collections::BTreeSet;
 
-/// A function's items: one that takes q and the parameters, and one that takes what was made of them.
-/// At a frame its name stands between the prefix and the function's name. `prepared` values are made of the parameters.
+/// A function's items: one that takes q and the parameters, and one that takes what was made of them. At a
+/// frame its name stands between the prefix and the function's name. `prepared` values are made of the
+/// parameters.
 pub(super) fn items(
     names: &Names,
     frame: Option<&str>,
@@ -177,7 +178,8 @@ pub(super) fn prepare(names: &Names, model: &Model, preparation: &Preparation) -
     }
     let operations = preparation.operations();
     let doc = format!(
-        "What the functions need of the parameters alone: for those that end in `_with`.\n\n* `parameters`: {}\n\n\
+        "What the functions need of the parameters alone: for those that end in `_with`.\n\n* `parameters`: \
+        {}\n\n\
          Operations: {} multiplications, {} additions.",
         names.words(Argument::Parameters.meaning()),
         operations.mul,

@@ -27,8 +27,8 @@ pub struct CFiles {
     pub source: String,
 }
 
-/// A generated file in C; `header` is the name by which it includes its header. Its results are those of the file in
-/// Rust to the bit.
+/// A generated file in C; `header` is the name by which it includes its header. Its results are those of the
+/// file in Rust to the bit.
 ///
 /// # Errors
 /// As [`super::source`].
@@ -203,9 +203,11 @@ typedef {prefix}_real real;
 fn head(names: &Names, model: &Model, options: &Options, rounded: &[String]) -> String {
     let upper = &names.upper;
     let needs = [
-        "Needs: C99 (or C++) and <math.h>. -ffp-contract=off gives the same bits on every machine, and those of the",
+        "Needs: C99 (or C++) and <math.h>. -ffp-contract=off gives the same bits on every machine, and those \
+        of the",
         "file in Rust.",
-        "Every function is proven equal to the Lagrangian of the arm; none allocates. A result may be written over an",
+        "Every function is proven equal to the Lagrangian of the arm; none allocates. A result may be \
+        written over an",
         "argument. Matrices are arrays of rows: result[i][j].",
     ];
     let contracted = fused::C.map(|line| line.replace("NAME", upper));
@@ -299,7 +301,8 @@ fn preparation(names: &Names, model: &Model, preparation: &Preparation) -> [Item
     // There is no array without elements.
     let count = preparation.values().len().max(1);
     let doc = documentation(&format!(
-        "Sums of the parameters as the functions use them; {prefix}_prepare makes them once for any\nnumber of calls."
+        "Sums of the parameters as the functions use them; {prefix}_prepare makes them once for any\nnumber \
+        of calls."
     ));
     let prepared = Item::Declared(format!(
         "{doc}typedef struct {{\n    {prefix}_real values[{count}];\n}} {prefix}_prepared;\n"

@@ -1,5 +1,5 @@
-//! The same functions in WGSL, the language of WebGPU, from the statements that the file in Rust is printed
-//! from; and entry points that call them for many states.
+//! The emitted functions in WGSL, the language of WebGPU, from the statements that the file in Rust is
+//! printed from; and entry points that call them for many states.
 
 mod entry;
 
@@ -48,12 +48,16 @@ pub fn wgsl_source(model: &Model, options: &Options) -> Result<String, Error> {
 /// The comment at the head; `rounded` are the lines of constants.
 fn head(model: &Model, options: &Options, rounded: &[String]) -> String {
     let needs = [
-        "Needs: WGSL. Numbers are f32, since the language has no f64. A compiler may contract and reorder sums, so",
+        "Needs: WGSL. Numbers are f32, since the language has no f64. A compiler may contract and reorder \
+        sums, so",
         "results are close to those of the file in C with floats and need not have their bits.",
         "Every function is proven equal to the Lagrangian of the arm. Matrices are arrays, row by row.",
-        "Entry points end in _batch: one invocation a state, in workgroups of 64, in a grid of one or two dimensions.",
-        "Arrays over count states are one behind the other: entry k of state s is at [k * count + s]. The parameters",
-        "are one array for all states. An entry point needs the bindings that its comment names and no other.",
+        "Entry points end in _batch: one invocation a state, in workgroups of 64, in a grid of one or two \
+        dimensions.",
+        "Arrays over count states are one behind the other: entry k of state s is at [k * count + s]. The \
+        parameters",
+        "are one array for all states. An entry point needs the bindings that its comment names and no \
+        other.",
     ];
     comment(docs::head_lines(model, options, &needs, &fused::WGSL).iter().chain(rounded).map(String::as_str))
 }
@@ -92,8 +96,9 @@ fn constants(names: &Names, model: &Model, parts: &Parts<'_>, options: &Options)
         format!("\n{doc}const {prefix}_parameter_values = {values};\n")
     });
     format!(
-        "// Number of joints.\n{joints}const {upper}_JOINTS: u32 = {}u;\n\n{}//\n{}const {upper}_PARAMETERS: u32 = \
-         {count}u;\n\n// Angles of a {prefix}_trig: those of the joints, then sums across parallel axes.\n\
+        "// Number of joints.\n{joints}const {upper}_JOINTS: u32 = {}u;\n\n{}//\n{}const {upper}_PARAMETERS: \
+         u32 = {count}u;\n\n// Angles of a {prefix}_trig: those of the joints, then sums across parallel \
+         axes.\n\
          const {upper}_ANGLES: u32 = {angles}u;\n{values}",
         arm.dof(),
         documentation(&docs::parameters(parts.set)),

@@ -324,8 +324,8 @@ impl fmt::Display for Cause {
             Cause::PositionAgainstVelocity(_, joint, slip) => {
                 write!(
                     f,
-                    "joint {joint}: position and integrated velocity differ by {slip:.4} rad: one of them is wrong, check \
-                        the encoder and the scales"
+                    "joint {joint}: position and integrated velocity differ by {slip:.4} rad: one of them is \
+                        wrong, check the encoder and the scales"
                 )
             }
             Cause::CurrentError(_, joint, measured, asked) => {
@@ -492,7 +492,8 @@ pub enum Rejection {
     Torque(JointNumber, f64, f64),
     /// Joint whose value the drive's type cannot hold: it would be cut.
     Saturated(JointNumber),
-    /// The receive PDO of this mode holds no torque offset: see [`Profile::with_torque_offset`](super::Profile::with_torque_offset).
+    /// The receive PDO of this mode holds no torque offset: see
+    /// [`Profile::with_torque_offset`](super::Profile::with_torque_offset).
     NoTorqueOffset,
     /// The arm does not follow set-points now.
     NotRunning,

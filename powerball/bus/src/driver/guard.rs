@@ -208,7 +208,8 @@ mod tests {
         );
     }
 
-    /// At full velocity the way to rest is 0.17 rad: nearer to the end of the range such a point does not leave.
+    /// At full velocity the way to rest is 0.17 rad: nearer to the end of the range such a point does not
+    /// leave.
     #[test]
     fn interpolated_points_leave_room_to_come_to_rest() {
         let joint = &LWA4P.joints[0];

@@ -33,7 +33,8 @@ impl core::fmt::Display for OtherMapping {
         let [has, needs] = self.bytes;
         write!(
             f,
-            "transmit PDO {} of node {} has {has} bytes, the profile's mapping {needs}: another master has mapped it otherwise",
+            "transmit PDO {} of node {} has {has} bytes, the profile's mapping {needs}: another master has \
+            mapped it otherwise",
             self.number,
             self.node.raw()
         )
@@ -55,8 +56,8 @@ impl<const N: usize> Listener<N> {
         Listener { profile, syncs: None, joints: [None; N] }
     }
 
-    /// Takes a frame. A SYNC closes the cycle before it, which is given where all joints have sent; one without all is left
-    /// out, and its time passes.
+    /// Takes a frame. A SYNC closes the cycle before it, which is given where all joints have sent; one
+    /// without all is left out, and its time passes.
     ///
     /// # Errors
     /// Process data of another length than the profile's mapping.

@@ -69,8 +69,8 @@ pub struct JointProfile {
     pub torque: f64,
     /// Greatest current, A.
     pub current: f64,
-    /// Greatest following error, rad: beyond the delay with which a drive follows. Written to 0x6065 where the
-    /// drive has it, and watched by the driver in interpolated position mode always.
+    /// Greatest following error, rad: beyond the delay with which a drive follows. Written to 0x6065 where
+    /// the drive has it, and watched by the driver in interpolated position mode always.
     pub following_error: f64,
     /// Greatest velocity error, rad/s, watched in velocity mode.
     pub velocity_error: f64,
@@ -101,13 +101,13 @@ pub struct Reactions {
     pub step_factor: f64,
     /// Greatest change of a current set-point in a cycle, as part of the joint's greatest current.
     pub current_step: f64,
-    /// A joint measured faster than this times its greatest velocity, for [`Reactions::missing_cycles`] cycles,
-    /// stops the arm.
+    /// A joint measured faster than this times its greatest velocity, for [`Reactions::missing_cycles`]
+    /// cycles, stops the arm.
     pub overspeed_factor: f64,
     /// Commanded travel in velocity mode, rad, before it is compared with the measured travel.
     pub scale_travel: f64,
-    /// Cycles in a row beyond [`JointProfile::following_error`] that stop the arm; their time is written to 0x6066
-    /// where the drive has it.
+    /// Cycles in a row beyond [`JointProfile::following_error`] that stop the arm; their time is written to
+    /// 0x6066 where the drive has it.
     pub following_cycles: u8,
     /// Cycles in a row beyond [`JointProfile::velocity_error`] that stop the arm.
     pub velocity_cycles: u8,
@@ -157,8 +157,8 @@ pub struct Reactions {
     pub torque_mode: TorqueMode,
 }
 
-/// Limits of the guard of current mode, where the caller closes the loop and no drive holds a position: a measurement
-/// that is wrong becomes a motion at once.
+/// Limits of the guard of current mode, where the caller closes the loop and no drive holds a position: a
+/// measurement that is wrong becomes a motion at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorqueMode {
     /// Cycles in a row beyond a limit that stop the arm, where no other number is given.
@@ -170,13 +170,15 @@ pub struct TorqueMode {
     /// A velocity that grows in one cycle by more than this part of the greatest one is not a measurement: it
     /// is not used.
     pub velocity_step: f64,
-    /// Way by which position and integrated velocity may drift apart, rad, next to a cycle at the greatest velocity …
+    /// Way by which position and integrated velocity may drift apart, rad, next to a cycle at the greatest
+    /// velocity …
     pub slip_margin: f64,
     /// … forgotten with this time constant, s.
     pub slip_time: f64,
     /// The measured current may differ from the commanded one by this part of the greatest current.
     pub current_error: f64,
-    /// The torque that acted may be off what the model needs for the measured motion by this part of the joint's torque, …
+    /// The torque that acted may be off what the model needs for the measured motion by this part of the
+    /// joint's torque, …
     pub torque_error: f64,
     /// … or, if that is less, by the torque of its own inertia at this part of its greatest acceleration, …
     pub acceleration_error: f64,

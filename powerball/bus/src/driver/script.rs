@@ -50,8 +50,8 @@ impl Write {
         self.number as u32 & self.verify
     }
 
-    /// For a setting that a drive need not have: a bit by which it is known. What declines it is watched by the
-    /// driver alone.
+    /// For a setting that a drive need not have: a bit by which it is known. What declines it is watched by
+    /// the driver alone.
     pub(super) fn optional(&self) -> Option<u8> {
         match self.object {
             objects::FOLLOWING_ERROR_WINDOW => Some(1),

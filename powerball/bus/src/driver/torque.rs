@@ -8,14 +8,16 @@ use super::profile::Profile;
 use core::fmt;
 use powerball_controller::JointNumber;
 
-/// Inverse dynamics: what the joints need, N·m, for positions (rad), velocities (rad/s) and accelerations (rad/s²).
+/// Inverse dynamics: what the joints need, N·m, for positions (rad), velocities (rad/s) and accelerations
+/// (rad/s²).
 type InverseDynamics<const N: usize> =
     dyn Fn(&[f64; N], &[f64; N], &[f64; N]) -> [f64; N] + Send + Sync + 'static;
 
-/// A model of the arm's torque for the guard of set-points: its inverse dynamics, gravity and friction included.
+/// A model of the arm's torque for the guard of set-points: its inverse dynamics, gravity and friction
+/// included.
 ///
-/// A function of the arm's generated code, or a closure over one with identified parameters; the driver calls it
-/// once a cycle, so it must be quick, and on a controller it must not allocate.
+/// A function of the arm's generated code, or a closure over one with identified parameters; the driver calls
+/// it once a cycle, so it must be quick, and on a controller it must not allocate.
 #[derive(Clone, Copy)]
 pub struct TorqueGuard<const N: usize> {
     model: &'static InverseDynamics<N>,

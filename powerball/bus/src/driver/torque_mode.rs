@@ -7,8 +7,9 @@
 //! * a velocity that no joint can have is not used, and stops the arm when it stays;
 //! * position and integrated velocity that drift apart: one of the two is wrong;
 //! * the measured current against the commanded one;
-//! * the torque that acted against what the model needs for the measured motion ([`TorqueGuard`]), where there is a model:
-//!   a drive that does not act or acts the wrong way, a joint that is stuck, an encoder that stands still;
+//! * the torque that acted against what the model needs for the measured motion ([`TorqueGuard`]), where
+//!   there is a model: a drive that does not act or acts the wrong way, a joint that is stuck, an encoder
+//!   that stands still;
 //! * where the caller says where the joint should be ([`Tracking`]), how far it is from there;
 //! * its velocity, with a smaller margin than in the other modes.
 //!

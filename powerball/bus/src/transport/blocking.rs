@@ -63,8 +63,9 @@ pub(super) fn write_within(
     run(bus, node, client, first).map(|_| ())
 }
 
-/// Writes one value to an object of several nodes: the requests leave one behind the other, before any answer is
-/// awaited, so that a dead node keeps none of the others waiting. Gives each node's answer, in their order.
+/// Writes one value to an object of several nodes: the requests leave one behind the other, before any answer
+/// is awaited, so that a dead node keeps none of the others waiting. Gives each node's answer, in their
+/// order.
 pub fn write_all(
     bus: &mut dyn Bus,
     nodes: &[NodeId],

@@ -34,7 +34,8 @@ impl<const N: usize> Observed<N> {
             {
                 if let Some(state) = now {
                     let joint = JointNumber::from_index(j).number();
-                    tracing::debug!(target: EVENTS, joint, first = before.is_none(), "joint {joint}: the drive is {state}");
+                    tracing::debug!(target: EVENTS, joint, first = before.is_none(), "joint {joint}: the \
+                        drive is {state}");
                 }
             }
             self.states = states;
@@ -43,10 +44,12 @@ impl<const N: usize> Observed<N> {
             self.phase = driver.phase();
             match driver.cause() {
                 Some(cause) if self.phase == Phase::Faulted => {
-                    tracing::error!(target: EVENTS, details = %driver.details(), "the arm was stopped: {cause}");
+                    tracing::error!(target: EVENTS, details = %driver.details(), "the arm was stopped: \
+                        {cause}");
                 }
                 _ => {
-                    tracing::info!(target: EVENTS, cycles = driver.counters().cycles, "the driver {}", self.phase)
+                    tracing::info!(target: EVENTS, cycles = driver.counters().cycles, "the driver \
+                        {}", self.phase)
                 }
             }
         }

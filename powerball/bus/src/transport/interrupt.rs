@@ -67,6 +67,7 @@ pub fn file_limit_is_an_error() -> io::Result<()> {
     Ok(())
 }
 
-/// A file would become larger than it may; the number on Linux (signal(7)), the same on all of its common machines.
+/// A file would become larger than it may; the number on Linux (signal(7)), the same on all of its common
+/// machines.
 #[cfg(target_os = "linux")]
 const SIGXFSZ: i32 = 25;

@@ -82,7 +82,8 @@ mod tests {
         \xaeis_extended_id\xc2\xafis_remote_frame\xc2\xaeis_error_frame\xc2\xa7channel\xc0\xa3dlc\x03\xa4data\xc4\
         \x03\x01\x02\x03\xa5is_fd\xc2\xaebitrate_switch\xc2\xb5error_state_indicator\xc2";
 
-    /// A datagram with bytes changed, lost and doubled: a frame or nothing, and a frame is one that can be sent on.
+    /// A datagram with bytes changed, lost and doubled: a frame or nothing, and a frame is one that can be
+    /// sent on.
     #[test]
     fn mutated_datagrams_are_read_or_left() {
         let mut state = 1u64;

@@ -5,8 +5,8 @@ use thread_priority::{
     set_thread_priority_and_policy, thread_native_id,
 };
 
-/// Above everything of the ordinary scheduler, in the middle of the range: below the kernel's own threads that carry
-/// the interrupts of the CAN controller where they have been given more.
+/// Above everything of the ordinary scheduler, in the middle of the range: below the kernel's own threads
+/// that carry the interrupts of the CAN controller where they have been given more.
 const PRIORITY: u8 = 50;
 
 /// Runs the calling thread under `SCHED_FIFO` and locks the process's memory, so that neither another program

@@ -52,8 +52,8 @@ impl SocketCan {
         Ok(SocketCan { socket, interface: interface.to_string(), clock: Clock::start() })
     }
 
-    /// When the kernel received a frame, on this bus's clock. Its stamp is of the system's clock, which may be set: an
-    /// age that makes no sense is not believed.
+    /// When the kernel received a frame, on this bus's clock. Its stamp is of the system's clock, which may
+    /// be set: an age that makes no sense is not believed.
     fn at(&self, stamp: SystemTime) -> Micros {
         let age = SystemTime::now().duration_since(stamp).unwrap_or_default();
         let age = if age < OLDEST { age.as_micros() as Micros } else { 0 };

@@ -33,8 +33,8 @@ impl UdpMulticast {
         UdpMulticast::open_on(group, None)
     }
 
-    /// Joins a multicast group on the network of an interface. Its datagrams reach that network (hop limit 1), and whoever
-    /// is on it can speak: fence it.
+    /// Joins a multicast group on the network of an interface. Its datagrams reach that network (hop limit
+    /// 1), and whoever is on it can speak: fence it.
     ///
     /// # Errors
     /// Those of [`open`](Self::open), and where this machine has no such interface.

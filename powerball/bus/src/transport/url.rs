@@ -15,8 +15,8 @@ pub enum BusUrl {
     SocketCan(String),
     /// A serial adapter that speaks slcan, and the bit rate of its bus in bit/s.
     Slcan(PathBuf, u32),
-    /// A multicast group and port of python-can's `udp_multicast`: of this machine alone, or on the network of an
-    /// interface.
+    /// A multicast group and port of python-can's `udp_multicast`: of this machine alone, or on the network
+    /// of an interface.
     Udp(SocketAddr, Option<Interface>),
 }
 
@@ -86,7 +86,8 @@ impl FromStr for BusUrl {
                 Some((group, interface)) if group.ip().is_multicast() => Ok(BusUrl::Udp(group, interface)),
                 Some(_) => Err(wrong("the address is not a multicast group (224.0.0.0 to 239.255.255.255)")),
                 None => Err(wrong(
-                    "udp needs an address and a port, and after @ an interface by its name or its own address",
+                    "udp needs an address and a port, and after @ an interface by its name or its own \
+                    address",
                 )),
             },
             _ => Err(wrong("its first word is unknown")),
@@ -106,7 +107,8 @@ fn port_of(text: &str) -> Result<(PathBuf, u32), String> {
     Ok((PathBuf::from(path), bitrate))
 }
 
-/// `239.74.163.2:43113`, or with `@` the name of the interface behind it, or its own address where the group is of IPv4.
+/// `239.74.163.2:43113`, or with `@` the name of the interface behind it, or its own address where the group
+/// is of IPv4.
 fn group_of(text: &str) -> Option<(SocketAddr, Option<Interface>)> {
     let (group, interface) = match text.split_once('@') {
         Some((group, interface)) => (group, Some(interface)),

@@ -13,11 +13,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// The handler that ends this process at SIGABRT, after all other handlers.
 static END: Mutex<Option<SigId>> = Mutex::new(None);
 
-/// A second process that stops the arm where this one dies before the arm rests: SIGKILL, an abort, a stack overflow, no
-/// memory left.
+/// A second process that stops the arm where this one dies before the arm rests: SIGKILL, an abort, a stack
+/// overflow, no memory left.
 ///
-/// It shares nothing with this process but a pipe, and sends nothing while this process lives. Dropped without
-/// [`dismiss`](Self::dismiss) it takes this process for dead, so that what is forgotten stops the arm too.
+/// The watchdog shares nothing with this process but a pipe, and sends nothing while this process lives.
+/// Dropped without [`dismiss`](Self::dismiss) it takes this process for dead, so that what is forgotten stops
+/// the arm too.
 #[derive(Debug)]
 pub struct Watchdog {
     child: Child,
@@ -25,7 +26,8 @@ pub struct Watchdog {
 }
 
 impl Watchdog {
-    /// Starts `command`, a program that calls [`wait`](Self::wait) and then stops the arm, and waits until it is there.
+    /// Starts `command`, a program that calls [`wait`](Self::wait) and then stops the arm, and waits until it
+    /// is there.
     ///
     /// # Errors
     /// Where it cannot be started, or ends at once.
@@ -37,7 +39,8 @@ impl Watchdog {
             let status = child.wait()?;
             return Err(io::Error::other(format!("it has ended, {status}")));
         }
-        // The pipe closes by itself when the process is gone, but a core dump of a large process comes before that.
+        // The pipe closes by itself when the process is gone, but a core dump of a large process comes before
+        // that.
         let pipe = child.stdin.as_ref().map(|stdin| stdin.as_fd().try_clone_to_owned()).transpose()?;
         let on_abort = pipe.map(|end| pipe::register(SIGABRT, end)).transpose()?;
         let mut end = END.lock().unwrap_or_else(PoisonError::into_inner);

@@ -79,8 +79,8 @@ pub fn contact_detector(on: &ModelArm) -> Result<ContactDetector<f64, 6>, String
     Ok(ContactDetector::new(laws, noise))
 }
 
-/// The model for the driver's guard of current mode: rigid arm, friction, and effects that hold a position. It stays in
-/// memory until the program ends.
+/// The model for the driver's guard of current mode: rigid arm, friction, and effects that hold a position.
+/// It stays in memory until the program ends.
 pub fn torque_guard(on: &ModelArm) -> TorqueGuard<6> {
     let (arm, terms, changes) =
         (on.numeric.clone(), on.model.holding_terms(), on.model.additions.log_changes.clone());
@@ -100,7 +100,8 @@ pub fn torque_guard(on: &ModelArm) -> TorqueGuard<6> {
     TorqueGuard::new(Box::leak(Box::new(torque)))
 }
 
-/// Adds what a model's [terms of position](powerball_explanation::torque_model::TorqueModel::holding_terms) hold against.
+/// Adds what a model's [terms of position](powerball_explanation::torque_model::TorqueModel::holding_terms)
+/// hold against.
 pub fn hold(
     changes: &LogChanges,
     terms: &[Term<f64>],

@@ -1,11 +1,11 @@
-//! One joint at constant velocities, there and back: the motion of a friction experiment, and the mean torques of
-//! its log.
+//! One joint at constant velocities, there and back: the motion of a friction experiment, and the mean
+//! torques of its log.
 
 use super::laws::Point;
 use powerball_logs::motion::Motion;
 
-/// Velocities of the paper's experiment, rad/s: eleven up to 0.2, where a Stribeck effect would show, and seven
-/// more up to 0.55; less where the joint is not as fast.
+/// Velocities of the paper's experiment, rad/s: eleven up to 0.2, where a Stribeck effect would show, and
+/// seven more up to 0.55; less where the joint is not as fast.
 #[must_use]
 pub fn velocities(fastest: f64) -> Vec<f64> {
     let scale = (0.95 * fastest / 0.55).min(1.0);

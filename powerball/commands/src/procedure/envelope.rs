@@ -111,7 +111,8 @@ impl<const N: usize> Envelope<N> {
         }
         if (motion.period - period).abs() > 1e-6 {
             return Err(RecordError::Motion(format!(
-                "the motion has a sample every {:.3} ms, the arm's SYNC comes every {:.3} ms: sample it at {} Hz",
+                "the motion has a sample every {:.3} ms, the arm's SYNC comes every {:.3} ms: sample it at \
+                {} Hz",
                 1e3 * motion.period,
                 1e3 * period,
                 (1.0 / period).round()
@@ -124,8 +125,8 @@ impl<const N: usize> Envelope<N> {
     /// Whether the arm may go along a motion, from rest at its first sample to rest at its last.
     ///
     /// # Errors
-    /// [`RecordError::Motion`] where the driver would not take it, [`RecordError::Barred`] where it takes too much
-    /// torque, or something would be touched.
+    /// [`RecordError::Motion`] where the driver would not take it, [`RecordError::Barred`] where it takes too
+    /// much torque, or something would be touched.
     pub fn check(&self, profile: &Profile<N>, motion: &Motion) -> Result<(), RecordError> {
         let rows = motion.samples().filter_map(|[q, ..]| <[f64; N]>::try_from(q).ok());
         check_path(profile, rows).map_err(|(k, why)| {
@@ -137,8 +138,8 @@ impl<const N: usize> Envelope<N> {
     }
 }
 
-/// The motion as the drives get it: positions, and the velocities and accelerations of their differences, whatever
-/// stands next to them in its file.
+/// The motion as the drives get it: positions, and the velocities and accelerations of their differences,
+/// whatever stands next to them in its file.
 fn as_sent(motion: &Motion) -> Motion {
     let (n, period) = (motion.dof(), motion.period);
     let q = |k: usize, j: usize| motion.q[k * n + j];

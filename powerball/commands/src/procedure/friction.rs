@@ -1,5 +1,5 @@
-//! The friction experiment (§II.C): each joint alone at constant velocities where gravity does not load it, and
-//! the law that fits.
+//! The friction experiment (§II.C): each joint alone at constant velocities where gravity does not load it,
+//! and the law that fits.
 
 use super::constant_velocity::{self, Bounds, Plan};
 use super::gravity_free::{self, GravityFree};
@@ -53,7 +53,8 @@ pub enum FrictionError {
     #[error("{0}")]
     Log(LogError),
     /// A log holds too few plateaus.
-    #[error("{}: fewer than five velocities can be determined from this log: delete it and record the joint again", .0.display())]
+    #[error("{}: fewer than five velocities can be determined from this log: delete it and record the joint \
+        again", .0.display())]
     TooLittle(PathBuf),
 }
 

@@ -187,7 +187,8 @@ impl Fitted {
 pub struct Rated {
     /// The fit.
     pub fitted: Fitted,
-    /// Root of the mean squared error of velocities that were left out, both directions of a velocity together, N·m.
+    /// Root of the mean squared error of velocities that were left out, both directions of a velocity
+    /// together, N·m.
     pub held_out: f64,
     /// The fits without each velocity: their spread is the band of the curve.
     folds: Vec<Fitted>,

@@ -93,8 +93,9 @@ impl Columns {
     }
 }
 
-/// The log of an arm that moves by whatever law, with [all columns](Columns::Everything): a whole line a cycle, written by a
-/// thread of its own. Dropped it is closed too: what was recorded counts, whatever ended it.
+/// The log of an arm that moves by whatever law, with [all columns](Columns::Everything): a whole line a
+/// cycle, written by a thread of its own. Dropped it is closed too: what was recorded counts, whatever ended
+/// it.
 #[derive(Debug)]
 pub struct MotionLog {
     time: LogTime,
@@ -189,8 +190,8 @@ impl fmt::Display for RecordProgress {
 
 // A writer behind a thread of its own: the cycle hands over a line and never waits for a disk.
 
-/// Lines that may wait. At 200 Hz these are 20 s; a disk that is silent for longer holds the cycle up, and a cycle that
-/// is held up stops the arm.
+/// Lines that may wait. At 200 Hz these are 20 s; a disk that is silent for longer holds the cycle up, and a
+/// cycle that is held up stops the arm.
 const WAITING: usize = 4000;
 
 /// A writer whose data another thread writes, completely and in order, with one call for each call here. An

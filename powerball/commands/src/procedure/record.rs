@@ -114,8 +114,8 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         &mut self.master
     }
 
-    /// Follows a motion, with `each` called for every cycle: the number of the sample that was given in it, and the
-    /// master, `None` where process data is missing.
+    /// Follows a motion, with `each` called for every cycle: the number of the sample that was given in it,
+    /// and the master, `None` where process data is missing.
     ///
     /// Where set-points came too late for their slot, the sample is given again and the motion is a cycle
     /// longer: a joint never has to catch up. `forward`: the torque that each drive is given with a sample,
@@ -208,8 +208,8 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         })
     }
 
-    /// Looks at a motion as a whole, for [`record`](Self::record): before the arm is [released](Self::release), as a
-    /// long one takes longer than a cycle.
+    /// Looks at a motion as a whole, for [`record`](Self::record): before the arm is
+    /// [released](Self::release), as a long one takes longer than a cycle.
     ///
     /// # Errors
     /// Where the arm must not go along it.
@@ -226,11 +226,13 @@ impl<B: Bus, const N: usize> Recorder<B, N> {
         self.follow(way.motion(), &[], |_, _| Ok(()))
     }
 
-    /// Follows a motion that begins where the arm is, and writes the log with these columns, `t` by `time`. The log is
-    /// written in the cycle, a line by a call: hand over a [`Behind`](super::Behind) where it is a file.
+    /// Follows a motion that begins where the arm is, and writes the log with these columns, `t` by `time`.
+    /// The log is written in the cycle, a line by a call: hand over a [`Behind`](super::Behind) where it is a
+    /// file.
     ///
     /// # Errors
-    /// Where the motion begins elsewhere, the arm is stopped, or the log cannot be written. The log ends there.
+    /// Where the motion begins elsewhere, the arm is stopped, or the log cannot be written. The log ends
+    /// there.
     pub fn record(
         &mut self,
         motion: &Cleared,

@@ -125,8 +125,8 @@ pub fn trend(cycles: &[Cycle]) -> Option<Trend> {
 // The path from an arm's position to the beginning of a motion.
 
 /// A motion from rest at `from` to rest at `to`, rad, every `period` s: all joints along 10x³ − 15x⁴ + 6x⁵,
-/// as slowly as the joint needs that has the farthest to go at `velocity` (rad/s) and `acceleration` (rad/s²),
-/// and for `least` s at least.
+/// as slowly as the joint needs that has the farthest to go at `velocity` (rad/s) and `acceleration`
+/// (rad/s²), and for `least` s at least.
 pub fn approach(
     from: &[f64],
     to: &[f64],

@@ -74,7 +74,8 @@ impl<B: Bus, const N: usize> TorqueLoop<B, N> {
     /// [`Driver::start`](powerball_bus::driver::Driver::start).
     ///
     /// # Errors
-    /// Where driver, arm or bus refuse, or a joint's torque constant is not known; the brakes are closed then.
+    /// Where driver, arm or bus refuse, or a joint's torque constant is not known; the brakes are closed
+    /// then.
     pub fn bring_up(mut master: Master<B, N>, accept_unverified: bool) -> Result<Self, RecordError> {
         master.driver_mut().start(ControlMode::Current, accept_unverified).map_err(ArmError::from)?;
         master.wait_for(Phase::Ready, PATIENCE)?;
@@ -83,8 +84,8 @@ impl<B: Bus, const N: usize> TorqueLoop<B, N> {
         if let Some(j) = constants.iter().position(|constant| !(constant.is_finite() && *constant > 0.0)) {
             let units = joints[j].units;
             return Err(RecordError::Barred(format!(
-                "joint {}: its torque constant is not known: {} N·m at a rated current of {} A. Set rated_torque in the bus \
-                    profile, and rated_current if the drive does not report 0x6075",
+                "joint {}: its torque constant is not known: {} N·m at a rated current of {} A. Set \
+                    rated_torque in the bus profile, and rated_current if the drive does not report 0x6075",
                 j + 1,
                 units.rated_torque,
                 units.rated_current
@@ -118,8 +119,9 @@ impl<B: Bus, const N: usize> TorqueLoop<B, N> {
         self.carried_on
     }
 
-    /// Releases the brakes and runs `law` in every cycle until it gives no torque. Torques are cut to what the joints have
-    /// and how fast the driver lets them change. `log` gets a line for every cycle whose data is complete.
+    /// Releases the brakes and runs `law` in every cycle until it gives no torque. Torques are cut to what
+    /// the joints have and how fast the driver lets them change. `log` gets a line for every cycle whose data
+    /// is complete.
     ///
     /// # Errors
     /// Where the arm is stopped, the driver rejects a set-point, or the log cannot be written.

@@ -93,16 +93,16 @@ impl Seen {
         Seen { cycles: vec![Vec::new(); motion.dof()], motion }
     }
 
-    /// Takes the rows (`t`, `q1…qn`, `tau1…taun`, `ref1…refn`, and more) of an earlier log of the same swing. `None`
-    /// where they are of another one.
+    /// Takes the rows (`t`, `q1…qn`, `tau1…taun`, `ref1…refn`, and more) of an earlier log of the same swing.
+    /// `None` where they are of another one.
     #[must_use]
     pub fn earlier(mut self, rows: &[Vec<f64>]) -> Option<Seen> {
         let n = self.motion.dof();
         if rows.iter().any(|row| row.len() < 1 + 3 * n) {
             return None;
         }
-        // A cycle ends and the next one begins with the set-point of the swing's end; where a program died, time
-        // has passed.
+        // A cycle ends and the next one begins with the set-point of the swing's end; where a program died,
+        // time has passed.
         let reference = 1 + 2 * n;
         let end = self.motion.q.first().copied()?;
         let rests = |row: &[f64]| (row[reference] - end).abs() < 1e-7;

@@ -16,8 +16,8 @@ pub fn files(explained: &Explained) -> Result<Files, String> {
     Ok(files.with("report.html", page.to_html()))
 }
 
-/// Adds everything that an explanation says to a page: the answer first; then errors, effects with their evidence, torques
-/// over time, what stays, what the columns are, and what was found in the logs.
+/// Adds everything that an explanation says to a page: the answer first; then errors, effects with their
+/// evidence, torques over time, what stays, what the columns are, and what was found in the logs.
 pub fn add_to_page(page: &mut Page, explained: &Explained) {
     if let Some(conventions) = explained.conventions.as_ref().filter(|c| c.is_remarkable()) {
         sections::columns_verdict(page, conventions);
@@ -44,11 +44,13 @@ pub fn add_to_page(page: &mut Page, explained: &Explained) {
 const WORDS: [(&str, &str); 12] = [
     (
         "base model",
-        "The rigid arm with its rotors and the friction of Eq. 16 (two tanh steps and a viscous part), before anything was added.",
+        "The rigid arm with its rotors and the friction of Eq. 16 (two tanh steps and a viscous part), \
+        before anything was added.",
     ),
     (
         "error",
-        "The rms of measured less predicted torque on the logs that were not fitted; before: of the base model, after: with all that was named.",
+        "The rms of measured less predicted torque on the logs that were not fitted; before: of the base \
+        model, after: with all that was named.",
     ),
     (
         "95 % interval",
@@ -57,11 +59,14 @@ const WORDS: [(&str, &str); 12] = [
     ("torque left", "The error after, as a share of the rms of the joint's torque."),
     (
         "verdict",
-        "At the noise floor: what is left is hardly more than the noise of the measurement. Predicted: at most a tenth of the torque's rms is left. Improved: more is left, and the error fell. Not predicted: more is left, and no error fell.",
+        "At the noise floor: what is left is hardly more than the noise of the measurement. Predicted: at \
+        most a tenth of the torque's rms is left. Improved: more is left, and the error fell. Not predicted: \
+        more is left, and no error fell.",
     ),
     (
         "right in",
-        "How often a name with such evidence is right, in 100 names on arms whose effects are known (docs/study.md).",
+        "How often a name with such evidence is right, in 100 names on arms whose effects are known \
+        (docs/study.md).",
     ),
     (
         "held-out gain",
@@ -108,7 +113,8 @@ fn logs(page: &mut Page, explained: &Explained) {
     page.table(&table);
 }
 
-/// Each joint's error before and after with how far it is explained, the names, and what to do about the rest.
+/// Each joint's error before and after with how far it is explained, the names, and what to do about the
+/// rest.
 fn answer(page: &mut Page, explained: &Explained) {
     page.heading("The answer");
     let (before, after) = (&explained.before.validate, &explained.after.validate);
@@ -195,9 +201,9 @@ fn errors(page: &mut Page, explained: &Explained) {
     let share = |(joint, share): (usize, &f64)| format!("joint {} {}", joint + 1, percent(*share));
     let shares: Vec<String> = explained.explainable.iter().enumerate().map(share).collect();
     page.paragraph(&format!(
-        "Of the squared error that is left, some smooth law of positions, velocities and directions would take away \
-         here: {}. Where that is much, a law is missing. Where it is little, the rest is noise, or depends on something \
-         else than the joints' states.",
+        "Of the squared error that is left, some smooth law of positions, velocities and directions would \
+         take away here: {}. Where that is much, a law is missing. Where it is little, the rest is noise, or \
+         depends on something else than the joints' states.",
         shares.join(", ")
     ));
 }
@@ -239,9 +245,9 @@ fn effects(page: &mut Page, explained: &Explained) {
     }
     page.table(&table);
     page.paragraph(
-        "Gain: by how much the squared error of folds that were left out falls, on the joint where it falls least. \
-         p: probability of as much by chance, over all that was tried. Evidence: against that of the next best name. Left \
-         over: share of the residual's excess over noise that stays on these joints.",
+        "Gain: by how much the squared error of folds that were left out falls, on the joint where it falls \
+         least. p: probability of as much by chance, over all that was tried. Evidence: against that of the \
+         next best name. Left over: share of the residual's excess over noise that stays on these joints.",
     );
     let mut figures: Vec<&Shown> = explained.shown.iter().collect();
     figures.sort_by_key(|shown| shown.joint);
@@ -272,8 +278,9 @@ fn laws(page: &mut Page, explained: &Explained) {
     }
     page.heading("What has no name");
     page.paragraph(
-        "No effect with a name explains this torque, and a smooth function of two joints does, on the other path too: \
-         a hose, a cable or a linkage between them. The formula is in the model; what it is of you must see on the arm.",
+        "No effect with a name explains this torque, and a smooth function of two joints does, on the other \
+         path too: a hose, a cable or a linkage between them. The formula is in the model; what it is of you \
+         must see on the arm.",
     );
     for law in &explained.laws {
         page.paragraph(&law.sentence());
@@ -363,8 +370,8 @@ fn rest(page: &mut Page, explained: &Explained) {
         n => format!(" (constant torques are left out: {n}, as they are the same at every time)"),
     };
     page.paragraph(&format!(
-        "How often the rule is wrong on these data: {} of {} effects that cannot be there were accepted{without}. \
-         The residuals are worth {} independent samples.",
+        "How often the rule is wrong on these data: {} of {} effects that cannot be there were \
+         accepted{without}. The residuals are worth {} independent samples.",
         chance.accepted, chance.surrogates, explained.effective_samples
     ));
 }

@@ -20,8 +20,9 @@ pub(super) const MOST_POINTS: usize = 2_500;
 /// At most this many are drawn large.
 const FEW_POINTS: usize = 200;
 
-/// The colour of a curve, after the Okabe–Ito palette, which colour-blind readers can distinguish, each with a lighter twin
-/// for dark pages. By convention measured is blue, predicted orange, residuals grey (before) and green (after).
+/// The colour of a curve, after the Okabe–Ito palette, which colour-blind readers can distinguish, each with
+/// a lighter twin for dark pages. By convention measured is blue, predicted orange, residuals grey (before)
+/// and green (after).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Ink {

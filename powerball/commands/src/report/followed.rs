@@ -3,7 +3,8 @@
 use crate::procedure::follow::{Followed, Path, Track};
 use crate::report::{Figure, Files, Ink, Page, Panel, Table, Tone, number};
 
-/// follow.json and report.html; `tracks` by name in the order in which they were driven, the last one in detail.
+/// follow.json and report.html; `tracks` by name in the order in which they were driven, the last one in
+/// detail.
 ///
 /// # Errors
 /// A result that is not JSON.

@@ -46,9 +46,9 @@ pub fn page(result: &Identified) -> Page {
     let mut page = Page::new(format!("Torque model of {}", result.arm));
     let [_, high] = result.band;
     page.lead(&format!(
-        "Minimal inertial set and friction of two tanh steps and a viscous part (Eq. 16), weighted least squares, each joint in a band of its \
-            own up to {high} Hz. Standard errors hold for residuals that depend on each other within blocks \
-            of two seconds."
+        "Minimal inertial set and friction of two tanh steps and a viscous part (Eq. 16), weighted least \
+            squares, each joint in a band of its own up to {high} Hz. Standard errors hold for residuals \
+            that depend on each other within blocks of two seconds."
     ));
     if let Some(conventions) = &result.conventions {
         sections::add_conventions(&mut page, conventions);
@@ -100,18 +100,21 @@ pub fn page(result: &Identified) -> Page {
 const WORDS: [(&str, &str); 7] = [
     (
         "minimal inertial set",
-        "The fewest combinations of masses, first moments and inertias that the torques depend on (base parameters). What is no part of it no motion can show.",
+        "The fewest combinations of masses, first moments and inertias that the torques depend on (base \
+        parameters). What is no part of it no motion can show.",
     ),
     (
         "Eq. 16",
-        "Friction as γ1 tanh(γ2 q̇) + γ3 tanh(γ4 q̇) + γ5 q̇: two smooth steps where the velocity turns, and a viscous part.",
+        "Friction as γ1 tanh(γ2 q̇) + γ3 tanh(γ4 q̇) + γ5 q̇: two smooth steps where the velocity turns, and \
+        a viscous part.",
     ),
     ("held out", "Of logs that took no part in the fit."),
     ("of the torque", "The rms of the error over the rms of the joint's measured torque."),
     ("noise alone", "What white noise of the measurement would leave in the band of the fit."),
     (
         "standard error",
-        "The standard deviation that the fitted value would have over many such logs; 95 of 100 times the true value is within 1.96 of them.",
+        "The standard deviation that the fitted value would have over many such logs; 95 of 100 times the \
+        true value is within 1.96 of them.",
     ),
     ("relative", "The standard error over the value. Above some 30 % the logs say little of the parameter."),
 ];

@@ -1,8 +1,8 @@
 //! The samples of a figure, for the script that lets a reader zoom.
 //!
-//! Without a script, and on paper, the page shows the figure as an SVG. With one, `figures.js` draws the samples with uPlot
-//! (Leon Sorokin, MIT, in `uplot/`): it reduces what is drawn to the lowest and highest value of each column of the screen, so a
-//! long log is an envelope from afar and samples from near.
+//! Without a script, and on paper, the page shows the figure as an SVG. With one, `figures.js` draws the
+//! samples with uPlot (Leon Sorokin, MIT, in `uplot/`): it reduces what is drawn to the lowest and highest
+//! value of each column of the screen, so a long log is an envelope from afar and samples from near.
 
 use super::figure::{Figure, MOST_POINTS, Mark, Panel, Series, envelope};
 use base64::Engine as _;
@@ -22,8 +22,9 @@ pub fn stream_page() -> String {
     format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" \
             content=\"width=device-width\"><title>powerball</title><style>{}{STYLE}</style></head><body><main><h1 \
-            id=\"title\">powerball</h1><p class=\"lead\" id=\"state\">waiting</p><div id=\"events\"></div><div \
-            id=\"charts\"></div></main><!-- {LICENCE} --><script>{}</script><script>{}</script></body></html>\n",
+            id=\"title\">powerball</h1><p class=\"lead\" id=\"state\">waiting</p><div \
+            id=\"events\"></div><div id=\"charts\"></div></main><!-- {LICENCE} \
+            --><script>{}</script><script>{}</script></body></html>\n",
         super::STYLE,
         SCRIPTS[0],
         include_str!("stream.js")

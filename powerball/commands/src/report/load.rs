@@ -1,7 +1,7 @@
 //! A load at the flange in the words of robots' controllers.
 //!
-//! What a form cannot hold is in [`Exported::notes`]: nothing is left out without a note. Forms with comments have the
-//! notes in them too.
+//! What a form cannot hold is in [`Exported::notes`]: nothing is left out without a note. Forms with comments
+//! have the notes in them too.
 
 use nalgebra::{Matrix3, Rotation3, SymmetricEigen};
 use serde::Deserialize;
@@ -11,11 +11,12 @@ use serde::Deserialize;
 pub struct Load {
     /// Mass, kg.
     pub mass: f64,
-    /// Its standard error, kg, where it is known.
+    /// The mass's standard error, kg, where it is known.
     pub mass_std: Option<f64>,
     /// Centre of mass in the last link's frame, m.
     pub centre: [f64; 3],
-    /// Inertia about the centre of mass along the axes of that frame, kg·m²; `None` where it was not determined.
+    /// Inertia about the centre of mass along the axes of that frame, kg·m²; `None` where it was not
+    /// determined.
     pub inertia: Option<Matrix3<f64>>,
 }
 
@@ -84,7 +85,8 @@ struct Body {
 }
 
 impl Load {
-    /// The load of a result: explained.json with a payload on the last link, or comparison.json whose cause is one.
+    /// The load of a result: explained.json with a payload on the last link, or comparison.json whose cause
+    /// is one.
     ///
     /// # Errors
     /// Why there is none.
@@ -112,9 +114,9 @@ impl Load {
                 let body = causes.into_iter().find(|cause| cause.cause == "payload").map(|cause| cause.body);
                 let body = body.ok_or("the two results do not differ by a load")?;
                 let body = body.ok_or(
-                    "the two results differ by a body whose mass or centre they do not determine, or which is not on the \
-                     last link; a `zero` of the last link in the arm file leaves a part of the centre out: take it \
-                     out of the file and identify again",
+                    "the two results differ by a body whose mass or centre they do not determine, or which \
+                     is not on the last link; a `zero` of the last link in the arm file leaves a part of the \
+                     centre out: take it out of the file and identify again",
                 )?;
                 let Body { mass, mass_std, com, inertia } = body;
                 let tensor =
@@ -137,8 +139,8 @@ impl Load {
             ));
         }
         let mut notes = vec![
-            "the centre of mass is in the frame of the last link: where the controller's flange has another frame, turn \
-             and move it"
+            "the centre of mass is in the frame of the last link: where the controller's flange has another \
+             frame, turn and move it"
                 .to_string(),
         ];
         match self.mass_std {
@@ -147,7 +149,9 @@ impl Load {
         }
         if self.inertia.is_none() {
             notes.push(
-                "the inertia about the centre of mass was not determined, or is one that no body has: it is given as 0".to_string()
+                "the inertia about the centre of mass was not determined, or is one that no body has: it is \
+                given as 0"
+                    .to_string(),
             );
         } else if !form.has_inertia() {
             notes.push("the form has no inertia: it is left out".to_string());
@@ -208,8 +212,8 @@ impl Load {
         )
     }
 
-    /// KRL: millimetres and degrees; inertias about the principal axes, which are turned by A about z, then by B about
-    /// the new y, then by C about the new x.
+    /// KRL: millimetres and degrees; inertias about the principal axes, which are turned by A about z, then
+    /// by B about the new y, then by C about the new x.
     fn kuka(&self) -> String {
         let SymmetricEigen { eigenvalues, mut eigenvectors } = SymmetricEigen::new(self.tensor());
         if eigenvectors.determinant() < 0.0 {
@@ -220,7 +224,8 @@ impl Load {
         let [a, b, c] = [a, b, c].map(|angle| format!("{:.3}", angle.to_degrees()));
         let [jx, jy, jz] = [0, 1, 2].map(|k| format!("{:.6}", eigenvalues[k]));
         format!(
-            "LOAD_DATA[1]={{M {:.3},CM {{X {x},Y {y},Z {z},A {a},B {b},C {c}}},J {{X {jx},Y {jy},Z {jz}}}}}\n",
+            "LOAD_DATA[1]={{M {:.3},CM {{X {x},Y {y},Z {z},A {a},B {b},C {c}}},J {{X {jx},Y {jy},Z \
+            {jz}}}}}\n",
             self.mass
         )
     }
@@ -271,8 +276,9 @@ impl Form {
 }
 
 /// A file that is neither result.
-const NO_RESULT: &str = "neither explained.json of `powerball explain` nor comparison.json of `powerball compare`; \
-    identified.json is a whole arm and no load: compare it with the fit of the arm without the load";
+const NO_RESULT: &str = "neither explained.json of `powerball explain` nor comparison.json of `powerball \
+    compare`; identified.json is a whole arm and no load: compare it with the fit of the arm without the \
+    load";
 
 /// Whether a body can have a tensor of inertia: no principal moment is more than the other two together.
 fn is_of_a_body(tensor: &Matrix3<f64>) -> bool {

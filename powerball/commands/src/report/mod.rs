@@ -1,5 +1,5 @@
-//! Self-contained HTML pages: figures that can be zoomed, and SVG where there is no script; no network, light and dark, fit
-//! for print.
+//! Self-contained HTML pages: figures that can be zoomed, and SVG where there is no script; no network, light
+//! and dark, fit for print.
 //!
 //! ```
 //! use powerball_commands::report::{Figure, Ink, Page, Panel, Series, Table};
@@ -16,9 +16,9 @@
 //! # let _ = Series::points("unused", Ink::Grey, Vec::new());
 //! ```
 //!
-//! The SVG of figures is written here and not by a plotting library because colours have to follow the reader's
-//! light or dark scheme through CSS classes, and because curves need sub-pixel coordinates to look right when
-//! printed: the SVG backend of `plotters` writes fixed colours at whole pixels.
+//! The SVG of figures is written here and not by a plotting library because colours have to follow the
+//! reader's light or dark scheme through CSS classes, and because curves need sub-pixel coordinates to look
+//! right when printed: the SVG backend of `plotters` writes fixed colours at whole pixels.
 
 mod axis;
 mod bars;

@@ -64,8 +64,8 @@ pub fn add_transmissions(page: &mut Page, joints: &[JointTransmission]) {
     page.table(&table);
     page.paragraph(
         "motor = k·(torque at the link + rotor·acceleration + friction + offset), fitted without a rigid \
-         model. Everything but k is at the link; where a joint is prismatic, N and m. Torque left: share of the \
-         motor torque on logs that were not fitted.",
+         model. Everything but k is at the link; where a joint is prismatic, N and m. Torque left: share of \
+         the motor torque on logs that were not fitted.",
     );
 }
 

@@ -29,9 +29,9 @@ pub fn in_words(found: &Found) -> String {
 pub fn page(found: &IdentifiedServos) -> Page {
     let mut page = Page::new(format!("Position servos of {}", found.arm));
     page.lead(
-        "Each joint's closed loop, simulated from its set-points alone: gain, delay, limits, motor and friction for which the \
-         simulated positions lie nearest to the measured ones. Standard errors hold for errors that depend on each other within \
-         a second.",
+        "Each joint's closed loop, simulated from its set-points alone: gain, delay, limits, motor and \
+         friction for which the simulated positions lie nearest to the measured ones. Standard errors hold \
+         for errors that depend on each other within a second.",
     );
     for reason in &found.unusable {
         page.note(Tone::Bad, &format!("Do not use this result: {reason}."));

@@ -94,7 +94,8 @@ impl<T: RealField + Copy> Joint<T> {
         self.friction.interrupt();
     }
 
-    /// Takes measured less predicted torque and the model's friction, N·m; `None` until [`ORDER`] samples came before.
+    /// Takes measured less predicted torque and the model's friction, N·m; `None` until [`ORDER`] samples
+    /// came before.
     pub fn update(&mut self, residual: T, friction: T) -> Option<Innovation<T>> {
         let of = |x: f64| nalgebra::convert::<f64, T>(x);
         let both =

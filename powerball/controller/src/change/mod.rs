@@ -7,12 +7,12 @@
 //! friction through the same filter and ρ its share by least squares over the last [`FOLLOWED`] samples,
 //! within ± range, is the innovation.
 //!
-//! **The null hypothesis**: given all before it and the whole motion, the mean of the innovation, cut at −[`LOSS`] and
-//! [`GAIN`], is at most m(t), and so is that of its negative, cut alike; m = margin + [`SLIP`]·range·|f(t)|. The margin
-//! is the model's error even where nothing has changed, the rest by how much a friction that wanders over its
-//! range within minutes is ahead of what was followed. Nothing else is assumed: no normal distribution, no
-//! variance, no independence of joints. (The means of normal innovations that are cut so are 0.0085, less
-//! than [`LEAST_MARGIN`].)
+//! **The null hypothesis**: given all before it and the whole motion, the mean of the innovation, cut at
+//! −[`LOSS`] and [`GAIN`], is at most m(t), and so is that of its negative, cut alike; m = margin +
+//! [`SLIP`]·range·|f(t)|. The margin is the model's error even where nothing has changed, the rest by how
+//! much a friction that wanders over its range within minutes is ahead of what was followed. Nothing else is
+//! assumed: no normal distribution, no variance, no independence of joints. (The means of normal innovations
+//! that are cut so are 0.0085, less than [`LEAST_MARGIN`].)
 //!
 //! **The test** ([`Bet`]) bets against it. A change adds Σ c_i·x_i to the torques: x are columns that are
 //! known (a kilogram in the hand, a radian of a joint's zero), c is its size, which is not. The bet takes c

@@ -141,8 +141,8 @@ fn the_mean_time_to_a_false_alarm_is_at_least_the_level() {
     assert!(mean_time(1, Law::Normal, 0.3, &|_, _| constant(0.9)) < 0.5 * LEVEL);
 }
 
-/// The heart of the guarantee, where it is closest: innovations of a mean at the margin multiply a bet's capital by 1 on
-/// average, and by more where the mean is more.
+/// The heart of the guarantee, where it is closest: innovations of a mean at the margin multiply a bet's
+/// capital by 1 on average, and by more where the mean is more.
 #[test]
 fn a_bet_is_fair_at_the_margin() {
     let gain = |mean: f64| {
@@ -191,7 +191,8 @@ fn friction_may_wander_within_its_range() {
     assert!(mean_time(1, Law::Normal, 0.0, &|_, k| 3.0 * RANGE * friction(k)) < 0.5 * LEVEL);
 }
 
-/// It is known when a change began and where, and on several joints it adds up: the bet on all of them finds it first.
+/// It is known when a change began and where, and on several joints it adds up: the bet on all of them finds
+/// it first.
 #[test]
 fn a_change_is_seen_where_and_when_it_is() {
     let (mut late, mut wrong, mut apart) = (0, 0, 0);

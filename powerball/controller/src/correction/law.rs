@@ -198,8 +198,8 @@ pub enum Law<T> {
         /// The play, rad.
         gap: T,
     },
-    /// Where the load turns, the link leaves the flank and flies through the play: −τ_rigid on the way, and the
-    /// impulse with which the other flank takes it up, without a bounce.
+    /// Where the load turns, the link leaves the flank and flies through the play: −τ_rigid on the way, and
+    /// the impulse with which the other flank takes it up, without a bounce.
     Flight {
         /// The play times the inertia that flies, N·m·s².
         reach: T,
@@ -270,8 +270,8 @@ fn is_single<T: 'static>() -> bool {
     TypeId::of::<T>() == TypeId::of::<f32>()
 }
 
-/// sin(x + ahead·π/2) with operations of single precision alone, within 1.2·10⁻⁷ up to 800 rad, and beyond to what x is
-/// known to.
+/// sin(x + ahead·π/2) with operations of single precision alone, within 1.2·10⁻⁷ up to 800 rad, and beyond to
+/// what x is known to.
 fn wave<T: RealField + Copy>(x: T, ahead: T) -> T {
     // π/2 in parts of 15, 15 and 24 bits: products of the first two with the number of turns are exact (Cody
     // and Waite).
@@ -422,8 +422,8 @@ impl<T: RealField + Copy> Memory<T> {
         self.wound
     }
 
-    /// J·ẍ of a link that is x ahead of its motor, within the play: x = `place`/J, ẋ = `wound`/J. No torque passes
-    /// in flight, so J·ẍ = −load; a flank stops it within a sample.
+    /// J·ẍ of a link that is x ahead of its motor, within the play: x = `place`/J, ẋ = `wound`/J. No torque
+    /// passes in flight, so J·ẍ = −load; a flank stops it within a sample.
     fn fly(&mut self, load: T, reach: T, time: T) -> T {
         let flank = reach * number(0.5);
         if !self.started {

@@ -16,17 +16,18 @@ pub struct Goal<T> {
     pub acceleration: Option<Vector6<T>>,
 }
 
-/// τ = Jᵀ·(K·e + D·ė) + g(q) + τ_n with e from the tool's pose to the goal's (m above rad, a rotation vector) and the
-/// null-space damping τ_n = −d·(B − JᵀΛJ)·q̇, Λ = (J·B⁻¹·Jᵀ + λ²·I)⁻¹ (Hogan 1985; Albu-Schäffer, Ott, Hirzinger, *A unified
-/// passivity-based control framework*, IJRR 26, 2007; Khatib, *A unified approach for motion and force control*, 1987).
+/// τ = Jᵀ·(K·e + D·ė) + g(q) + τ_n with e from the tool's pose to the goal's (m above rad, a rotation vector)
+/// and the null-space damping τ_n = −d·(B − JᵀΛJ)·q̇, Λ = (J·B⁻¹·Jᵀ + λ²·I)⁻¹ (Hogan 1985; Albu-Schäffer,
+/// Ott, Hirzinger, *A unified passivity-based control framework*, IJRR 26, 2007; Khatib, *A unified approach
+/// for motion and force control*, 1987).
 ///
-/// B − JᵀΛJ is positive semidefinite for every λ and vanishes on what moves the tool where λ = 0, so the damping takes
-/// energy and no force from the tool. At a fixed goal V = ½·q̇ᵀB·q̇ + ½·eᵀK·e (small rotations) has V̇ = −ẋᵀD·ẋ −
-/// d·q̇ᵀ(B − JᵀΛJ)·q̇ + q̇ᵀτ_ext ≤ q̇ᵀτ_ext: passive. With an acceleration C·q̇ and Jᵀ·Λ·(ẍ_r − J̇·q̇) come to it: away from
-/// singularities Λ·ë + D·ė + K·e = 0 (Khatib).
+/// B − JᵀΛJ is positive semidefinite for every λ and vanishes on what moves the tool where λ = 0, so the
+/// damping takes energy and no force from the tool. At a fixed goal V = ½·q̇ᵀB·q̇ + ½·eᵀK·e (small rotations)
+/// has V̇ = −ẋᵀD·ẋ − d·q̇ᵀ(B − JᵀΛJ)·q̇ + q̇ᵀτ_ext ≤ q̇ᵀτ_ext: passive. With an acceleration C·q̇ and
+/// Jᵀ·Λ·(ẍ_r − J̇·q̇) come to it: away from singularities Λ·ë + D·ė + K·e = 0 (Khatib).
 ///
-/// Near a singularity λ grows (Nakamura and Hanafusa 1986): where the least mobility of the tool falls below `least`, forces
-/// that Λ would ask for stay finite. The passive form needs Λ for its damping alone.
+/// Near a singularity λ grows (Nakamura and Hanafusa 1986): where the least mobility of the tool falls below
+/// `least`, forces that Λ would ask for stay finite. The passive form needs Λ for its damping alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CartesianImpedance<T> {
     /// Diagonal of K, N/m above N·m/rad.
@@ -40,7 +41,8 @@ pub struct CartesianImpedance<T> {
 }
 
 impl<T: RealField + Copy> CartesianImpedance<T> {
-    /// Springs of these stiffnesses (N/m, N·m/rad), critically damped; null space damped with 5/s; `least` = 0.01/kg.
+    /// Springs of these stiffnesses (N/m, N·m/rad), critically damped; null space damped with 5/s; `least` =
+    /// 0.01/kg.
     #[must_use]
     pub fn new(translation: T, rotation: T) -> Self {
         CartesianImpedance {

@@ -4,11 +4,12 @@ use super::number;
 use crate::dynamics::{ArmModel, Reference, State};
 use nalgebra::{RealField, SMatrix, SVector};
 
-/// τ = B(q)·(q̈_r + K_p·e + K_d·ė) + C(q, q̇)·q̇ + g(q) with e = q_r − q (Siciliano, Sciavicco, Villani, Oriolo: *Robotics*,
-/// §8.5.2; Spong, Hutchinson, Vidyasagar, §8.3).
+/// τ = B(q)·(q̈_r + K_p·e + K_d·ė) + C(q, q̇)·q̇ + g(q) with e = q_r − q (Siciliano, Sciavicco, Villani,
+/// Oriolo: *Robotics*, §8.5.2; Spong, Hutchinson, Vidyasagar, §8.3).
 ///
-/// With the true model ë + K_d·ė + K_p·e = 0 at each joint: exponentially stable for positive gains. A model that is
-/// wrong by Δτ leaves e = (B·K_p)⁻¹·Δτ at rest. Sampled and late it is stable where [`super::largest_pole`] says so.
+/// With the true model ë + K_d·ė + K_p·e = 0 at each joint: exponentially stable for positive gains. A model
+/// that is wrong by Δτ leaves e = (B·K_p)⁻¹·Δτ at rest. Sampled and late it is stable where
+/// [`super::largest_pole`] says so.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ComputedTorque<T, const N: usize> {
     /// K_p, 1/s².
@@ -27,7 +28,8 @@ impl<T: RealField + Copy, const N: usize> ComputedTorque<T, N> {
         }
     }
 
-    /// The default for a cycle of `period` s: ω = 0.1/period. With a hold and a cycle of delay 58° of phase margin are left.
+    /// The default for a cycle of `period` s: ω = 0.1/period. With a hold and a cycle of delay 58° of phase
+    /// margin are left.
     #[must_use]
     pub fn for_period(period: T) -> Self {
         Self::of_bandwidth(number::<T>(0.1) / period)
@@ -35,8 +37,9 @@ impl<T: RealField + Copy, const N: usize> ComputedTorque<T, N> {
 
     /// The torque, N·m, of rigid arm and feedback.
     ///
-    /// A controller that acts a cycle late gives the reference of the time at which its torque acts, and the state carried on
-    /// to there along the reference: `q` = that reference's position less the error that was measured.
+    /// A controller that acts a cycle late gives the reference of the time at which its torque acts, and the
+    /// state carried on to there along the reference: `q` = that reference's position less the error that was
+    /// measured.
     #[must_use]
     pub fn torque(
         &self,
@@ -60,8 +63,8 @@ impl<T: RealField + Copy, const N: usize> ComputedTorque<T, N> {
     }
 }
 
-/// An integrator of errors that does not wind up: it waits where the torque is cut, unless the error leads away from
-/// the limit (conditional integration; Åström and Hägglund: *PID Controllers*, §3.5).
+/// An integrator of errors that does not wind up: it waits where the torque is cut, unless the error leads
+/// away from the limit (conditional integration; Åström and Hägglund: *PID Controllers*, §3.5).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Integrator<T, const N: usize> {
     /// N·m for each rad·s; 0 switches a joint's off.
@@ -144,8 +147,8 @@ mod tests {
         assert!((plant.state.q - goal.q).norm() < 1e-6 && plant.state.dq.norm() < 1e-6, "{:?}", plant.state);
     }
 
-    /// A torque limit holds a joint away from its goal for 10 s; once free it comes back without overshooting by more than it
-    /// would have after 0 s.
+    /// A torque limit holds a joint away from its goal for 10 s; once free it comes back without overshooting
+    /// by more than it would have after 0 s.
     #[test]
     fn an_integrator_does_not_wind_up_at_a_limit() {
         let overshoot = |held_for: usize, anti_windup: bool| {

@@ -12,7 +12,8 @@ pub struct Softening<T> {
     pub share: T,
     /// v₀, rad/s: half of it is taken off at this velocity.
     pub fade: T,
-    /// Level of the hold at rest, N·m: a weight that the model is wrong by does not move the joint up to here.
+    /// Level of the hold at rest, N·m: a weight that the model is wrong by does not move the joint up to
+    /// here.
     pub hold: T,
     /// The way after which the hold has built up, rad.
     pub give: T,
@@ -34,17 +35,20 @@ impl<T: RealField + Copy> Softening<T> {
     }
 }
 
-/// τ = g(q) + κ·w(q̇)·f(q̇) − h: weight compensation, friction of the direction in which the joint begins to move, faded in
-/// by w = |q̇|/(|q̇| + v₀), and a hold h that yields (Armstrong-Hélouvry, Dupont, Canudas de Wit, *A survey of models … with
-/// friction*, Automatica 30, 1994, §5: why friction must not be taken off at rest by the sign of a velocity that is noise).
+/// τ = g(q) + κ·w(q̇)·f(q̇) − h: weight compensation, friction of the direction in which the joint begins to
+/// move, faded in by w = |q̇|/(|q̇| + v₀), and a hold h that yields (Armstrong-Hélouvry, Dupont, Canudas de
+/// Wit, *A survey of models … with friction*, Automatica 30, 1994, §5: why friction must not be taken off at
+/// rest by the sign of a velocity that is noise).
 ///
-/// The direction that a hand intends is that in which the joint creeps: drives have no torque sensor, and a momentum observer
-/// sees a joint that sticks at rest. At q̇ = 0 the compensation and its slope vanish, so noise of the velocity pushes nothing.
-/// With κ·f below the true friction f_t in both directions the joint stays dissipative: q̇·(κ·w·f − f_t) ≤ 0. The hold is an
-/// elastic slider (Prandtl): a spring hold/give whose end slips at `hold`, which stores no more than hold·give/2 and takes
-/// energy whenever it slips. So the arm is passive towards the hand; what it needs is about (1 − κ)·f + hold. Sampled and
-/// late, κ·∂f/∂q̇ acts against the same slope of the true friction: steady for κ < 1 as long as the slope times the cycle is less
-/// than the joint's inertia (tested at 200 Hz). A lighter joint with steep friction creeps: run it faster, or take a smaller share.
+/// The direction that a hand intends is that in which the joint creeps: drives have no torque sensor, and a
+/// momentum observer sees a joint that sticks at rest. At q̇ = 0 the compensation and its slope vanish, so
+/// noise of the velocity pushes nothing. With κ·f below the true friction f_t in both directions the joint
+/// stays dissipative: q̇·(κ·w·f − f_t) ≤ 0. The hold is an elastic slider (Prandtl): a spring hold/give whose
+/// end slips at `hold`, which stores no more than hold·give/2 and takes energy whenever it slips. So the arm
+/// is passive towards the hand; what it needs is about (1 − κ)·f + hold. Sampled and late, κ·∂f/∂q̇ acts
+/// against the same slope of the true friction: steady for κ < 1 as long as the slope times the cycle is less
+/// than the joint's inertia (tested at 200 Hz). A lighter joint with steep friction creeps: run it faster, or
+/// take a smaller share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandGuiding<T, const N: usize> {
     /// Eq. 16 by joint.
@@ -146,7 +150,8 @@ mod tests {
         assert!(dq.norm() < 1e-3, "{dq}");
     }
 
-    /// Work of the law's friction and hold over random closed motions of a joint: never given, up to what the spring stores.
+    /// Work of the law's friction and hold over random closed motions of a joint: never given, up to what the
+    /// spring stores.
     #[test]
     fn what_is_taken_off_never_exceeds_the_friction() {
         use rand::{RngExt, SeedableRng};

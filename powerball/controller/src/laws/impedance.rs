@@ -4,12 +4,13 @@ use super::number;
 use crate::dynamics::{ArmModel, Reference, State};
 use nalgebra::{RealField, SMatrix, SVector};
 
-/// τ = K·(q_r − q) + D·(q̇_r − q̇) + B(q)·q̈_r + C(q, q̇)·q̇_r + g(q): PD+ (Paden and Panja, *Globally asymptotically stable
-/// PD+ controller*, Int. J. Control 47, 1988), as impedance of Hogan (*Impedance Control*, 1985).
+/// τ = K·(q_r − q) + D·(q̇_r − q̇) + B(q)·q̈_r + C(q, q̇)·q̇_r + g(q): PD+ (Paden and Panja, *Globally
+/// asymptotically stable PD+ controller*, Int. J. Control 47, 1988), as impedance of Hogan (*Impedance
+/// Control*, 1985).
 ///
-/// V = ½·ėᵀB·ė + ½·eᵀK·e has V̇ = −ėᵀD·ė − ėᵀτ_ext, because Ḃ − 2C is skew: the arm is passive towards what touches it for
-/// K, D ≥ 0, and errors vanish without contact. Sampled and late this holds up to the stiffness at which
-/// [`super::largest_pole`] reaches 1.
+/// V = ½·ėᵀB·ė + ½·eᵀK·e has V̇ = −ėᵀD·ė − ėᵀτ_ext, because Ḃ − 2C is skew: the arm is passive towards what
+/// touches it for K, D ≥ 0, and errors vanish without contact. Sampled and late this holds up to the
+/// stiffness at which [`super::largest_pole`] reaches 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointImpedance<T, const N: usize> {
     /// K, N·m/rad.
@@ -19,8 +20,8 @@ pub struct JointImpedance<T, const N: usize> {
 }
 
 impl<T: RealField + Copy, const N: usize> JointImpedance<T, N> {
-    /// Springs that let each joint, with its own inertia at a pose, swing at `bandwidth` rad/s with the damping ratio
-    /// `ratio`: K = ω²·B_jj, D = 2·ζ·ω·B_jj.
+    /// Springs that let each joint, with its own inertia at a pose, swing at `bandwidth` rad/s with the
+    /// damping ratio `ratio`: K = ω²·B_jj, D = 2·ζ·ω·B_jj.
     #[must_use]
     pub fn of_inertia(inertia: &SMatrix<T, N, N>, bandwidth: T, ratio: T) -> Self {
         let own = inertia.diagonal();
@@ -86,8 +87,8 @@ mod tests {
         assert!(before < 0.05 * start, "{before} of {start}");
     }
 
-    /// Sampled at 200 Hz and a cycle late, pressed with the second joint against a wall of 20 kN·m/rad. On a wall without any
-    /// loss the delay keeps it bouncing by some mm; a wall with a loss holds it.
+    /// Sampled at 200 Hz and a cycle late, pressed with the second joint against a wall of 20 kN·m/rad. On a
+    /// wall without any loss the delay keeps it bouncing by some mm; a wall with a loss holds it.
     #[test]
     fn contact_with_a_stiff_wall_stays_bounded() {
         let arm = Planar::<3>::default();

@@ -4,8 +4,9 @@ use super::number;
 use crate::dynamics::{ArmModel, State};
 use nalgebra::{Matrix6, RealField, SMatrix, SVector, Vector6};
 
-/// r = K·(p − ∫(τ + Cᵀ·q̇ − g + r)dt − p(0)) with p = B·q̇ (De Luca and Mattone, *Sensorless robot collision detection and
-/// hybrid force/motion control*, ICRA 2005; Haddadin, De Luca, Albu-Schäffer, *Robot collisions: a survey*, T-RO 33, 2017).
+/// r = K·(p − ∫(τ + Cᵀ·q̇ − g + r)dt − p(0)) with p = B·q̇ (De Luca and Mattone, *Sensorless robot collision
+/// detection and hybrid force/motion control*, ICRA 2005; Haddadin, De Luca, Albu-Schäffer, *Robot
+/// collisions: a survey*, T-RO 33, 2017).
 ///
 /// ṙ = K·(τ_ext − r): each joint's external torque through a low pass of its own, for any motion, without
 /// acceleration. Errors of the model count as external torque, friction included, so give it τ less the
@@ -64,8 +65,9 @@ impl<T: RealField + Copy, const N: usize> MomentumObserver<T, N> {
     }
 }
 
-/// Force and moment on the tool's frame that external torques at the joints fit best: (J·Jᵀ + λ²·I)⁻¹·J·τ_ext, N above N·m,
-/// in base axes. `damping` is λ² (m², rad²), which bounds what a singular pose cannot tell.
+/// Force and moment on the tool's frame that external torques at the joints fit best: (J·Jᵀ +
+/// λ²·I)⁻¹·J·τ_ext, N above N·m, in base axes. `damping` is λ² (m², rad²), which bounds what a singular pose
+/// cannot tell.
 ///
 /// `None` where J is not a number.
 #[must_use]

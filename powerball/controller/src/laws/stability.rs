@@ -19,8 +19,8 @@ impl<T: RealField + Copy> LargestPole<T> {
     }
 }
 
-/// The largest pole of B·q̈ = τ under τ = −K·q − D·q̇ that is measured at a SYNC, acts from the next one on and holds for
-/// a cycle of `period` s. Units: kg·m², N·m/rad, N·m·s/rad.
+/// The largest pole of B·q̈ = τ under τ = −K·q − D·q̇ that is measured at a SYNC, acts from the next one on
+/// and holds for a cycle of `period` s. Units: kg·m², N·m/rad, N·m·s/rad.
 ///
 /// The plant is double integrators with a hold, exactly discretised (Franklin, Powell, Workman: *Digital
 /// Control of Dynamic Systems*, 3rd ed., §4.3); the state is q, q̇ and the torque that acts now. Friction is

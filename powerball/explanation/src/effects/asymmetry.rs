@@ -37,7 +37,8 @@ impl Figures {
     pub(super) fn in_words(&self, words: &Words<'_>) -> String {
         let (torque, position) = (words.torque(), words.position());
         let one = |(k, (constant, viscous)): (usize, (&f64, &f64))| {
-            // A joint's two parts may be one effect or two: the standard error is that of a part which stands alone.
+            // A joint's two parts may be one effect or two: the standard error is that of a part which stands
+            // alone.
             let alone =
                 words.relative_std.len() == self.torque.len() && (*constant == 0.0 || *viscous == 0.0);
             let size = |value: f64| if alone { words.size(k, value) } else { number(value) };
@@ -126,7 +127,8 @@ impl Effect for Asymmetry {
 /// A direction with less than this share of a joint's motion does not count.
 const BOTH_WAYS: f64 = 0.05;
 
-/// Whether a joint turns either way: where it turns one way only, what differs with the direction is its friction.
+/// Whether a joint turns either way: where it turns one way only, what differs with the direction is its
+/// friction.
 fn turns_both_ways(context: &Context<'_>, joint: JointNumber) -> bool {
     let (data, j) = (context.data, joint.index());
     let moving =

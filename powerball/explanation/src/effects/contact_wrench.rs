@@ -11,8 +11,8 @@ use std::f64::consts::PI;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A force in the base frame at the tool, during a window of one log: constant, rising and falling as that of a hand
-/// does, or of any shape and direction over time.
+/// A force in the base frame at the tool, during a window of one log: constant, rising and falling as that of
+/// a hand does, or of any shape and direction over time.
 pub(super) struct ContactWrench;
 
 /// The course of its force within its windows.
@@ -45,8 +45,8 @@ pub struct Figures {
 pub struct Point {
     /// The link.
     pub link: JointNumber,
-    /// The point in the link's own frame, m: that of its robot description where the arm file has it, else that of the
-    /// table.
+    /// The point in the link's own frame, m: that of its robot description where the arm file has it, else
+    /// that of the table.
     pub xyz: [f64; 3],
 }
 
@@ -95,8 +95,8 @@ const COARSE: usize = 4;
 /// Longer windows keep away from their log's ends by a share of 1 / `CLEAR` of it where the arm feels a
 /// weight: what is there until the end is then a payload.
 const CLEAR: usize = 10;
-/// Share of a window's gain that one half of its time must explain to be a push by itself: a force that is constant
-/// explains half of it in half of its time.
+/// Share of a window's gain that one half of its time must explain to be a push by itself: a force that is
+/// constant explains half of it in half of its time.
 const ALONE: f64 = 0.65;
 /// Larger forces are a rank-poor fit, N.
 const MOST: f64 = 2000.0;
@@ -108,7 +108,8 @@ const LATE: [f64; 3] = [-0.25, 0.0, 0.25];
 const KNOTS: usize = 5;
 /// A longer force leans on the arm and does not push it, s.
 pub(crate) const LONGEST_PUSH: f64 = 4.0;
-/// Grid of the same push in other logs, s: its force is known there, so that a row more or less makes a difference.
+/// Grid of the same push in other logs, s: its force is known there, so that a row more or less makes a
+/// difference.
 const FINE: f64 = 0.1;
 
 impl Effect for ContactWrench {
@@ -266,8 +267,8 @@ fn search(context: &Context<'_>) -> Option<Vec<Candidate>> {
         }
     }
     let (mut gain, mut found) = best?;
-    // Two pushes with a pause are two: one that explains most of a window in half of its time is taken by itself,
-    // and the other one is found after it.
+    // Two pushes with a pause are two: one that explains most of a window in half of its time is taken by
+    // itself, and the other one is found after it.
     while found.len() > 1 {
         let longest = found.len().div_ceil(2);
         let mut part = None;
@@ -319,8 +320,8 @@ fn pushes(context: &Context<'_>, constant: &Candidate, rests: &[Window]) -> Vec<
     LONGER.into_iter().flat_map(of).flatten().collect()
 }
 
-/// Columns of a force of another size over its windows; `shape` says of 0 … 1, from a window's beginning to its end, how
-/// large it is.
+/// Columns of a force of another size over its windows; `shape` says of 0 … 1, from a window's beginning to
+/// its end, how large it is.
 fn shaped(
     context: &Context<'_>,
     constant: &[Column],

@@ -48,7 +48,8 @@ pub enum Part {
     /// A rigid arm under another gravity, m/s² in the base frame, and the changes of all its parameters that
     /// this gravity shows; empty if there are none.
     Gravity([f64; 3], Vec<f64>),
-    /// A body that a link may carry (the last one where none is named): mass in kg and centre in m, in its frame.
+    /// A body that a link may carry (the last one where none is named): mass in kg and centre in m, in its
+    /// frame.
     Payload(f64, [f64; 3], Option<JointNumber>),
     /// Logs whose position of the candidate's joints is this much above the true one, rad.
     EncoderOffset(f64),
@@ -103,8 +104,8 @@ pub trait Effect: Sync {
         false
     }
 
-    /// Of a candidate that a single log may have while the others have not (a zero, a delay): by what its coefficient
-    /// is multiplied to be its figure, and the coefficients that are possible.
+    /// Of a candidate that a single log may have while the others have not (a zero, a delay): by what its
+    /// coefficient is multiplied to be its figure, and the coefficients that are possible.
     fn change_of_a_log(&self, _candidate: &Candidate) -> Option<(f64, Range<f64>)> {
         None
     }
@@ -187,8 +188,8 @@ pub trait Effect: Sync {
         None
     }
 
-    /// The same effect without an assumption that its law makes; `None` where it makes none. By the difference
-    /// of the two sizes the standard error is larger.
+    /// The same effect without an assumption that its law makes; `None` where it makes none. By the
+    /// difference of the two sizes the standard error is larger.
     fn otherwise(&self, _candidate: &Candidate) -> Option<Candidate> {
         None
     }

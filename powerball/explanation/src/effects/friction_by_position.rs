@@ -1,5 +1,5 @@
-//! Friction that differs from place to place: a gear that runs out of true, a worn stretch, a seal that is pressed on
-//! one side.
+//! Friction that differs from place to place: a gear that runs out of true, a worn stretch, a seal that is
+//! pressed on one side.
 
 use super::words::{Words, list, number, numbers};
 use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found};
@@ -10,8 +10,8 @@ use powerball_logs::regression::Recording;
 use serde::Serialize;
 use std::f64::consts::TAU;
 
-/// τ = tanh(γ·q̇)·(a·cos(k·q) + b·sin(k·q)), k = 1 or 2 cycles a joint turn: what the first two orders of a joint's turn add
-/// to its Coulomb friction.
+/// τ = tanh(γ·q̇)·(a·cos(k·q) + b·sin(k·q)), k = 1 or 2 cycles a joint turn: what the first two orders of a
+/// joint's turn add to its Coulomb friction.
 pub(super) struct FrictionByPosition;
 
 /// Settings of this effect, which the search varies.
@@ -42,7 +42,8 @@ impl Figures {
         let (amplitude, at) = (words.sizes(&self.amplitude.0, 1.0), numbers(&self.position));
         let (torque, position) = (words.torque(), words.position());
         format!(
-            "friction that varies by ±{amplitude} {torque} in {orders} cycles a {way}, largest at {at} {position}"
+            "friction that varies by ±{amplitude} {torque} in {orders} cycles a {way}, largest at {at} \
+            {position}"
         )
     }
 }

@@ -1,4 +1,5 @@
-//! A body on any link, or on a bar of a closed loop, as columns: first moment and mass about the link's joint, and its inertia there.
+//! A body on any link, or on a bar of a closed loop, as columns: first moment and mass about the link's
+//! joint, and its inertia there.
 
 use super::Context;
 use nalgebra::{Matrix3, Vector3};
@@ -21,8 +22,9 @@ pub(super) struct Body {
     /// Mass, kg, and centre in the link's frame, m, as a point of that moment and inertia.
     pub mass: f64,
     pub centre: Vector3<f64>,
-    /// Whether the mass itself shows. It does not where the link's joint does not move in space. Then it follows from
-    /// the inertia, which in a slow motion looks like a moment: good enough for torques, and no figure to be given.
+    /// Whether the mass itself shows. It does not where the link's joint does not move in space. Then it
+    /// follows from the inertia, which in a slow motion looks like a moment: good enough for torques, and no
+    /// figure to be given.
     pub shows_mass: bool,
 }
 
@@ -50,7 +52,8 @@ pub(super) fn direction(c: &[f64]) -> Option<[f64; 3]> {
     Vector3::new(c[0], c[1], c[2]).try_normalize(0.0).map(Into::into)
 }
 
-/// The origin of a link's joint in the link's frame, m: where it is fixed in the link, else that of the frame.
+/// The origin of a link's joint in the link's frame, m: where it is fixed in the link, else that of the
+/// frame.
 fn joint(context: &Context<'_>, link: usize) -> Vector3<f64> {
     let chain = Chain::new(context.data.body.arm());
     // A bar's frame is at its pin.
@@ -62,8 +65,8 @@ fn joint(context: &Context<'_>, link: usize) -> Vector3<f64> {
     -(rotation.transpose() * origin)
 }
 
-/// The columns of a body on a link, on the joints that carry the link. Its inertia about the joint is that of a point
-/// in the direction `along` of its first moment; the same about all axes while that is not known.
+/// The columns of a body on a link, on the joints that carry the link. Its inertia about the joint is that of
+/// a point in the direction `along` of its first moment; the same about all axes while that is not known.
 pub(super) fn columns(context: &Context<'_>, link: usize, along: Option<[f64; 3]>) -> Vec<Column> {
     let of_link = context.data.link_columns(link);
     if of_link.is_empty() {
@@ -94,8 +97,8 @@ pub(super) fn columns(context: &Context<'_>, link: usize, along: Option<[f64; 3]
         .collect()
 }
 
-/// m mx my mz Ixx Ixy Ixz Iyy Iyz Izz about the frame's origin of a body about `joint`; products as in Eq. 5 of the
-/// paper, positive sums.
+/// m mx my mz Ixx Ixy Ixz Iyy Iyz Izz about the frame's origin of a body about `joint`; products as in Eq. 5
+/// of the paper, positive sums.
 fn parameters(joint: Vector3<f64>, along: Option<Vector3<f64>>, c: &[f64; COLUMNS]) -> [f64; 10] {
     let (moment, mass) = (Vector3::new(c[0], c[1], c[2]), c[MASS]);
     let about = moment + joint * mass;

@@ -1,5 +1,5 @@
-//! A body held by the last link or carried by another one, or by a bar of a closed loop, from the start of a log or from some time on, to its
-//! end or to some time.
+//! A body held by the last link or carried by another one, or by a bar of a closed loop, from the start of a
+//! log or from some time on, to its end or to some time.
 
 use super::link_body::{self, Body};
 use super::windows::{Sums, best_run, by_log, cut, explained, lasting_window};
@@ -13,9 +13,10 @@ use serde::Serialize;
 use std::ops::{Range, RangeInclusive};
 use std::sync::Arc;
 
-/// On the last link: mass and first moment in the last frame as four columns; the inertia is that of a point mass at the
-/// centre of mass last estimated, so a few rounds make it consistent. On any other link ([`link_body`]): first moment
-/// about its joint, mass and inertia, since often the first moment is all that shows.
+/// On the last link: mass and first moment in the last frame as four columns; the inertia is that of a point
+/// mass at the centre of mass last estimated, so a few rounds make it consistent. On any other link
+/// ([`link_body`]): first moment about its joint, mass and inertia, since often the first moment is all that
+/// shows.
 pub(super) struct Payload;
 
 /// Settings of this effect, on which its columns and windows depend.
@@ -26,8 +27,8 @@ pub struct Settings {
     pub com: Option<[f64; 3]>,
     /// Whether it is in every log that was recorded after its start.
     pub stays: bool,
-    /// The link that carries it; `None` for the last one's hand. Of another link `com` is the direction of the first
-    /// moment.
+    /// The link that carries it; `None` for the last one's hand. Of another link `com` is the direction of
+    /// the first moment.
     pub link: Option<usize>,
     /// What is taken of its inertia.
     pub inertia: Inertia,
@@ -52,8 +53,8 @@ pub struct Figures {
     /// it, else that of the table.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub com_in_link: Option<[f64; 3]>,
-    /// Until when, one for each log that has it, in the log's own t, s: null where it stays to the end; nothing
-    /// where it does in all.
+    /// Until when, one for each log that has it, in the log's own t, s: null where it stays to the end;
+    /// nothing where it does in all.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub end_time: Vec<Option<f64>>,
     /// First moment of the body about the joint of its link, in the link's frame, kg·m; nothing on the last
@@ -246,7 +247,8 @@ impl Effect for Payload {
                 |steps: &Range<usize>| explains[steps.clone()].iter().map(|(less, _)| less).sum::<f64>();
             let was = taken.iter().any(|w| w.log == data.logs[steps[log.start].log]);
             let all = sum(&log) + if was { least } else { -least };
-            // A beginning and an end are searched for: they must explain more than the best of all runs by chance.
+            // A beginning and an end are searched for: they must explain more than the best of all runs by
+            // chance.
             let part = sum(&run) - least - 4.0 * (log.len() as f64).ln();
             let held = if long_enough(&run, &log, FINE) && part > all.max(0.0) { run } else { log.clone() };
             if held != log || all > 0.0 {

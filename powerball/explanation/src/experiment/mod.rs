@@ -56,9 +56,9 @@ fn advice(open: &Open, design: &DesignedExperiment, visible: f64) -> String {
         format!("to distinguish {both}, {how}")
     } else {
         format!(
-            "{both} predict nearly the same torques on every path within the limits (on the best path found the wrong one \
-             is expected to fit worse by χ² = {:.1}, and {visible:.0} would be clear): if the new log does \
-             not decide, the one with fewer numbers is taken; {how}",
+            "{both} predict nearly the same torques on every path within the limits (on the best path found \
+             the wrong one is expected to fit worse by χ² = {:.1}, and {visible:.0} would be clear): if the \
+             new log does not decide, the one with fewer numbers is taken; {how}",
             design.evidence
         )
     }

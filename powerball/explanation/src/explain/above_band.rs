@@ -63,7 +63,7 @@ struct Ripple {
 }
 
 impl Ripple {
-    /// It, accepted by a step, in the model of an arm with `dof` joints.
+    /// This ripple, accepted by a step, in the model of an arm with `dof` joints.
     fn accepted_by(self, number: usize, dof: usize) -> Accepted {
         let Ripple { candidate, coefficients, p_value, gain, .. } = self;
         Accepted {
@@ -132,8 +132,8 @@ fn is_the_same(a: &Candidate, b: &Candidate) -> bool {
     a.joints == b.joints && (x - y).abs() < APART
 }
 
-/// Whether the error on the validation set rises in the band: a ripple that is there passes it slowly where the joint turns
-/// back.
+/// Whether the error on the validation set rises in the band: a ripple that is there passes it slowly where
+/// the joint turns back.
 fn raises_error(study: &Study<'_>, model: &Model, ripple: &Ripple) -> bool {
     let joint = ripple.candidate.joints[0].index();
     let columns = study.on_validation(&model.fit, &[]).columns(&ripple.candidate);
@@ -411,8 +411,8 @@ fn noise_around(traces: &[Trace], order: f64) -> f64 {
     power.get(power.len() / 2).map_or(f64::INFINITY, |median| median / LN_2)
 }
 
-/// Orders on either side that say what noise gives, how far the first is and how far they are apart: a path of
-/// four radians distinguishes two orders that differ by that much.
+/// Orders on either side that say what noise gives, how far the first is and how far they are apart: a path
+/// of four radians distinguishes two orders that differ by that much.
 const NEIGHBOURS: usize = 20;
 const FIRST: f64 = 4.0;
 pub(super) const APART: f64 = 1.5;
@@ -486,8 +486,8 @@ mod traces_tests {
         assert!(wave.gain_on(&swinging(2, |q| -ripple(q)), 0.01).is_none());
     }
 
-    /// Where a rate is low, the fastest samples cannot show the highest orders: those that are left out there shift no
-    /// other.
+    /// Where a rate is low, the fastest samples cannot show the highest orders: those that are left out there
+    /// shift no other.
     #[test]
     fn orders_keep_their_places_where_some_are_left_out() {
         let mut asked = 0;

@@ -248,7 +248,8 @@ impl<'s> Together<'s> {
         self.weights[joint]
     }
 
-    /// The coefficient of a column in one log alone and what it explains, χ²; `None` where the model imitates it wholly.
+    /// The coefficient of a column in one log alone and what it explains, χ²; `None` where the model imitates
+    /// it wholly.
     pub(crate) fn screen(&self, side: usize, log: usize, column: &Column) -> Option<(f64, f64)> {
         self.solve(side, log, column).map(|(theta, gain, _)| (theta, gain))
     }

@@ -28,7 +28,8 @@ pub(super) enum Origin {
     Baseline { columns: usize },
     /// A step accepted it.
     Step { number: usize, columns: usize },
-    /// A step accepted it above the band of the fit: its coefficients were measured there, and it has no columns.
+    /// A step accepted it above the band of the fit: its coefficients were measured there, and it has no
+    /// columns.
     AboveBand { number: usize, coefficients: Vec<f64> },
 }
 
@@ -92,8 +93,8 @@ impl Accepted {
 
 /// How much of an accepted effect is its own.
 pub(super) struct Own {
-    /// The share of its squared torque that no other column can take over: 1 less R² of its torque over all other
-    /// columns, weighted as in the fit.
+    /// The share of its squared torque that no other column can take over: 1 less R² of its torque over all
+    /// other columns, weighted as in the fit.
     pub(super) share: f64,
     /// The standard error of its size, a share of it; `None` where it was measured otherwise.
     pub(super) relative_std: Option<f64>,
@@ -212,9 +213,10 @@ impl Model {
         Some((dot(&gradient, c), variance.max(0.0).sqrt()))
     }
 
-    /// The standard error of an accepted effect's size, a share of it; `of_factor` is that of the factor of its
-    /// torque. Where its law assumes something, the truth is anywhere between this and what logs say without
-    /// the assumption: with equal chances the mean square of its distance is a third of the square of theirs.
+    /// The standard error of an accepted effect's size, a share of it; `of_factor` is that of the factor of
+    /// its torque. Where its law assumes something, the truth is anywhere between this and what logs say
+    /// without the assumption: with equal chances the mean square of its distance is a third of the square of
+    /// theirs.
     pub(super) fn size_error(&self, study: &Study<'_>, k: usize, of_factor: Option<f64>) -> Option<f64> {
         let Some((size, std)) = self.size(k) else { return of_factor };
         let a = &self.accepted[k];

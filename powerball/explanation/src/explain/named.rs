@@ -85,8 +85,8 @@ pub struct Rival {
 /// Why a name is not given that a step gave and a later one took back.
 pub(super) const TAKEN_BACK: &str = "did not last, or could not be distinguished from its rivals";
 
-/// The rule applied to surrogates: candidates that cannot be true, shifted in time within each recording or, where
-/// that changes nothing (a constant torque), with the signs of the recordings drawn.
+/// The rule applied to surrogates: candidates that cannot be true, shifted in time within each recording or,
+/// where that changes nothing (a constant torque), with the signs of the recordings drawn.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FalsePositives {
     /// Surrogates tried.

@@ -74,8 +74,8 @@ impl Head<'_> {
         writeln!(text, "  <ModelVariables>")?;
         let time = "causality=\"independent\" variability=\"continuous\" unit=\"s\"";
         writeln!(text, "    <Float64 name=\"time\" valueReference=\"0\" {time}/>")?;
-        let step = "causality=\"parameter\" variability=\"fixed\" initial=\"exact\" unit=\"s\" start=\"0.0002\" \
-                    description=\"longest step of the integration\"";
+        let step = "causality=\"parameter\" variability=\"fixed\" initial=\"exact\" unit=\"s\" \
+                    start=\"0.0002\" description=\"longest step of the integration\"";
         writeln!(text, "    <Float64 name=\"max_step\" valueReference=\"1\" {step}/>")?;
         let joints: Vec<_> = arm.moving_joints().zip(arm.joint_names()).collect();
         for (block, (prefix, what, units, causality)) in VARIABLES.iter().enumerate() {

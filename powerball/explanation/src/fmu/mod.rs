@@ -1,8 +1,8 @@
 //! The arm as it moves, for simulators of systems: an FMU (FMI 3.0, Co-Simulation) with τ in and q, q̇ out.
 //!
-//! Its sources are the rigid arm as dyngen writes it in C, the model's numbers and terms, and three files
-//! that are the same for every model: the motion ([`crate::simulate`] in C), laws with a memory, and the
-//! functions of FMI.
+//! The sources of the FMU are the rigid arm as dyngen writes it in C, the model's numbers and terms, and
+//! three files that are the same for every model: the motion ([`crate::simulate`] in C), laws with a memory,
+//! and the functions of FMI.
 
 mod description;
 mod terms;
@@ -110,8 +110,8 @@ impl TorqueModel {
     fn not_simulated(&self) -> Vec<String> {
         let mut notes = vec![
             "limits are not in it: no joint stops at its end, and no torque is too large".to_string(),
-            "time counts as the time since the arm began to work, as cold as it was recorded: it matters to friction \
-             that warmth changes"
+            "time counts as the time since the arm began to work, as cold as it was recorded: it matters to \
+             friction that warmth changes"
                 .to_string(),
         ];
         for t in self.terms() {

@@ -124,7 +124,8 @@ fn laws_in_c_are_those_of_the_controller() {
              states[s][4], 0.01 * s };\n";
     for k in 0..laws.len() {
         text += &format!(
-            "        {{ double t[4] = {{ 0.0 }}; law_{k}(&now, &memory[{k}], t); printf(\"%.17g\\n\", t[1]); }}\n"
+            "        {{ double t[4] = {{ 0.0 }}; law_{k}(&now, &memory[{k}], t); printf(\"%.17g\\n\", t[1]); \
+            }}\n"
         );
     }
     text += "    }\n    return 0;\n}\n";

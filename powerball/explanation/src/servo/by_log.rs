@@ -1,8 +1,9 @@
-//! What one log of position servos has that the others do not: another mass at the end of the arm, or another gain.
+//! What one log of position servos has that the others do not: another mass at the end of the arm, or another
+//! gain.
 //!
-//! Each log is asked alone, with the servo as it was found on all: which mass, or which gain, would lower its position error?
-//! A log is unlike the others where its squared error is twice theirs, one of them takes away half of it, and is larger than
-//! what the same question gives on the other logs by chance.
+//! Each log is asked alone, with the servo as it was found on all: which mass, or which gain, would lower its
+//! position error? A log is unlike the others where its squared error is twice theirs, one of them takes away
+//! half of it, and is larger than what the same question gives on the other logs by chance.
 
 use crate::rule::Rule;
 use powerball_identification::estimate::distribution::t_critical;
@@ -10,8 +11,8 @@ use powerball_identification::servo::constants::Constant;
 use powerball_identification::servo::fit::{Fitted, Free, errors, fit, objective, slopes};
 use powerball_identification::servo::{Joint, Problem, Role, standard_errors};
 
-/// Masses that are tried first, in units of the mass whose weight is a tenth of the torque at full duty: a swing in phase
-/// with another mass is a minimum too.
+/// Masses that are tried first, in units of the mass whose weight is a tenth of the torque at full duty: a
+/// swing in phase with another mass is a minimum too.
 const MASSES: [f64; 10] = [-1.0, -0.6, -0.3, 0.0, 0.3, 0.6, 1.0, 1.6, 2.4, 3.5];
 /// Gains that are tried first, as shares of the one of the arm file.
 const GAINS: [f64; 7] = [0.2, 0.35, 0.6, 1.0, 1.6, 2.7, 4.5];
@@ -38,7 +39,7 @@ pub(super) enum Change {
 impl Change {
     pub(super) const ALL: [Change; 2] = [Change::Payload, Change::Gain];
 
-    /// Its name in results.
+    /// The change's name in results.
     pub(super) fn name(self) -> &'static str {
         match self {
             Change::Payload => "payload",
@@ -60,7 +61,7 @@ impl Change {
 pub(super) struct Size {
     /// kg, or a share.
     pub value: f64,
-    /// Its standard error within these logs.
+    /// The standard error within these logs.
     pub std: f64,
     /// Blocks that count as independent.
     pub blocks: usize,
@@ -86,7 +87,8 @@ impl Size {
     }
 }
 
-/// The size of a change in the logs of a problem, everything else as it is there; `None` where the joint cannot show it.
+/// The size of a change in the logs of a problem, everything else as it is there; `None` where the joint
+/// cannot show it.
 pub(super) fn size(problem: &Problem<'_>, change: Change) -> Option<Size> {
     let (role, unit, first): (Role, f64, &[f64]) = match change {
         Change::Payload => {
@@ -137,7 +139,8 @@ pub(super) fn sizes(logs: &[Problem<'_>]) -> Vec<[Option<Size>; 2]> {
     logs.iter().map(|log| Change::ALL.map(|change| size(log, change))).collect()
 }
 
-/// How much each change differs between logs that have none: what a size is compared with in addition to its own error.
+/// How much each change differs between logs that have none: what a size is compared with in addition to its
+/// own error.
 pub(super) fn spread(sizes: &[[Option<Size>; 2]], odd: &[bool], change: Change) -> f64 {
     let mut values: Vec<f64> = sizes
         .iter()
@@ -150,8 +153,8 @@ pub(super) fn spread(sizes: &[[Option<Size>; 2]], odd: &[bool], change: Change) 
     values.get(values.len() / 2).map_or(0.0, |median| median / 0.6745)
 }
 
-/// The squared error of each log over the median one of the fitted logs, which are the first `fitted`; `None` where no
-/// change can be tested.
+/// The squared error of each log over the median one of the fitted logs, which are the first `fitted`; `None`
+/// where no change can be tested.
 pub(super) fn error_ratios(sizes: &[[Option<Size>; 2]], fitted: usize) -> Vec<Option<f64>> {
     let error = |of: &[Option<Size>; 2]| of.iter().flatten().next().map(|size| size.before);
     let mut usual: Vec<f64> = sizes[..fitted].iter().filter_map(error).collect();
@@ -160,8 +163,8 @@ pub(super) fn error_ratios(sizes: &[[Option<Size>; 2]], fitted: usize) -> Vec<Op
     sizes.iter().map(|of| Some(error(of)? / usual)).collect()
 }
 
-/// Which logs are unlike the fitted ones, which are the first `fitted`: by log, the change that explains it best. All
-/// validation logs can have a change.
+/// Which logs are unlike the fitted ones, which are the first `fitted`: by log, the change that explains it
+/// best. All validation logs can have a change.
 pub(super) fn odd(sizes: &[[Option<Size>; 2]], fitted: usize, rule: &Rule) -> Vec<Option<Change>> {
     let ratios = error_ratios(sizes, fitted);
     let spreads = Change::ALL.map(|change| spread(&sizes[..fitted], &vec![false; fitted], change));
@@ -179,8 +182,8 @@ pub(super) fn odd(sizes: &[[Option<Size>; 2]], fitted: usize, rule: &Rule) -> Ve
     sizes.iter().zip(&ratios).map(best).collect()
 }
 
-/// The logs of each change, those whose sizes agree together: two loads are two effects. A size has its own standard error, and
-/// in addition what logs without a change differ by.
+/// The logs of each change, those whose sizes agree together: two loads are two effects. A size has its own
+/// standard error, and in addition what logs without a change differ by.
 pub(super) fn groups(changes: &[Option<Change>], sizes: &[[Option<Size>; 2]]) -> Vec<(Change, Vec<usize>)> {
     let mut groups: Vec<(Change, Vec<usize>)> = Vec::new();
     let odd: Vec<bool> = changes.iter().map(Option::is_some).collect();
@@ -209,8 +212,8 @@ pub(super) fn groups(changes: &[Option<Change>], sizes: &[[Option<Size>; 2]]) ->
     groups
 }
 
-/// Logs that are not unlike enough alone join those whose change, as large as it is there, takes away as much of their squared
-/// error as a change must.
+/// Logs that are not unlike enough alone join those whose change, as large as it is there, takes away as much
+/// of their squared error as a change must.
 pub(super) fn join(
     groups: &mut [(Change, Vec<usize>)],
     changes: &mut [Option<Change>],
@@ -237,8 +240,8 @@ pub(super) fn together<'o>(each: &[Problem<'o>], own: &[usize]) -> Problem<'o> {
     each[own[0]].clone().and(own[1..].iter().map(|k| &each[*k]))
 }
 
-/// A payload of `own` logs, fitted with all constants of the joint, which the logs `like` share: what friction and what
-/// weight is, both loads decide. With the errors of `own`.
+/// A payload of `own` logs, fitted with all constants of the joint, which the logs `like` share: what
+/// friction and what weight is, both loads decide. With the errors of `own`.
 pub(super) fn payload(
     each: &[Problem<'_>],
     (like, own): (&[usize], &[usize]),

@@ -1,8 +1,8 @@
 //! What the model of an arm on position servos lacks, judged by positions of other logs.
 //!
-//! The base of each joint is its closed loop with Coulomb and viscous friction. What candidates add must lower the error of
-//! simulated positions on the validation logs, block by block; what one log has alone is looked for first, since such a log
-//! would bend everything else.
+//! The base of each joint is its closed loop with Coulomb and viscous friction. What candidates add must
+//! lower the error of simulated positions on the validation logs, block by block; what one log has alone is
+//! looked for first, since such a log would bend everything else.
 
 mod by_log;
 mod candidates;
@@ -94,7 +94,7 @@ fn explain_joint(
 struct Odd<'o, 'l> {
     /// The joint with all friction, as it is in the logs that it is compared with.
     joint: Joint<'l>,
-    /// It in each log.
+    /// The joint's problem in each log.
     each: Vec<Problem<'o>>,
     /// By log, those to fit first.
     changes: Vec<Option<Change>>,

@@ -61,7 +61,7 @@ pub struct ServoEffect {
     pub effect: &'static str,
     /// The joints that have it.
     pub joints: Vec<JointNumber>,
-    /// Its parameters, in SI units.
+    /// The effect's parameters, in SI units.
     pub parameters: serde_json::Map<String, serde_json::Value>,
     /// Position error without it, rms by joint, rad: on the validation logs, or on the logs that have it.
     pub rms_before: Vec<f64>,
@@ -96,8 +96,8 @@ pub struct LogResult {
     pub log: String,
     /// Whether it is as the others are.
     pub like_the_others: bool,
-    /// Its position error before anything was named, over the median one of the fitted logs; of the joint where it is
-    /// largest.
+    /// The log's position error before anything was named, over the median one of the fitted logs; of the
+    /// joint where it is largest.
     pub error_ratio: Option<f64>,
     /// What it has alone.
     pub differs: Vec<Differs>,
@@ -171,7 +171,11 @@ impl ExplainedServos {
             };
             let advice = match state {
                 "predicted" => String::new(),
-                _ => "record steps, a fast path and one where the drive is switched off, with two loads that are known".into(),
+                _ => {
+                    "record steps, a fast path and one where the drive is switched off, with two loads that \
+                    are known"
+                        .into()
+                }
             };
             self.verdict.push(ServoVerdict { joint, state, left, advice });
             if left >= 1.0 {

@@ -1,4 +1,5 @@
-//! On measured logs of a servo: another gain is named, another mass is found, and nothing where nothing differs.
+//! On measured logs of a servo: another gain is named, another mass is found, and nothing where nothing
+//! differs.
 
 use super::*;
 use servos::{GAINS, LENGTHS, MASSES, Measured, PATHS, pendulum, point};
@@ -21,7 +22,8 @@ fn explained(measured: &Measured, own: (usize, f64, u32), validate: &[ServoLog])
     found
 }
 
-/// Whether a log of another gain, and no other, is named with a gain, and whether that is within a factor of 1.35 of the right one.
+/// Whether a log of another gain, and no other, is named with a gain, and whether that is within a factor of
+/// 1.35 of the right one.
 fn names_the_gain(measured: &Measured, own: (usize, f64, u32), other: u32, path: &str) -> [bool; 2] {
     let of = (MASSES[own.0].0, own.1, own.2);
     let mut validate: Vec<ServoLog> =
@@ -47,8 +49,8 @@ fn another_gain_in_one_log_is_named_and_nothing_where_nothing_differs() {
     let same = measured.logs((MASSES[0].0, 0.15, 16), 2);
     let found = in_single_logs(&measured, (0, 0.15, 16), &same);
     assert!(found.is_empty(), "{found:?}");
-    // If every validation log has another gain, most of them are still unlike the fitted ones. The gains of single paths
-    // differ, so there can be two effects.
+    // If every validation log has another gain, most of them are still unlike the fitted ones. The gains of
+    // single paths differ, so there can be two effects.
     let others = measured.logs((MASSES[0].0, 0.15, 32), 2);
     let found = in_single_logs(&measured, (0, 0.15, 16), &others);
     let named: usize = found.iter().map(|effect| effect.logs.len()).sum();

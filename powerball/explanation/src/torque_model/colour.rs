@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 
 /// Least number of rows from which a joint's colour is learnt.
 const FEWEST: usize = 200;
-/// The margin is such that no test on the logs it was learnt from comes nearer to an alarm than the level to the power
-/// of this.
+/// The margin is such that no test on the logs it was learnt from comes nearer to an alarm than the level to
+/// the power of this.
 const CALM: f64 = 0.5;
 /// A joint whose model is wrong by more standard deviations than this cannot be watched.
 const MOST_MARGIN: f64 = 1.5;

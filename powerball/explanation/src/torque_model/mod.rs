@@ -212,7 +212,8 @@ impl TorqueModel {
         data.residual(&torque)
     }
 
-    /// The torque along a recording of the log `log`, which has the model's latest payload during the windows `held`.
+    /// The torque along a recording of the log `log`, which has the model's latest payload during the windows
+    /// `held`.
     pub(crate) fn torque_in(
         &self,
         body: &RigidArm,

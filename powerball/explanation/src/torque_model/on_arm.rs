@@ -21,13 +21,14 @@ impl<const N: usize> ModelOnArm<N> {
     /// A model of the arm of a file, with its effects or without.
     ///
     /// # Errors
-    /// In words: a model of another arm or of another number of joints, an arm whose motors turn with several joints.
+    /// In words: a model of another arm or of another number of joints, an arm whose motors turn with several
+    /// joints.
     pub fn new(arm: &Arm, read: &ModelFile, effects: bool) -> Result<Self, String> {
         let (named, name) = (&read.model.arm, read.file.display());
         if !named.is_empty() && *named != arm.name {
             return Err(format!(
-                "{name}: is a model of the arm '{named}', and the arm file is of '{}': take the arm file that it was \
-                    identified with",
+                "{name}: is a model of the arm '{named}', and the arm file is of '{}': take the arm file \
+                    that it was identified with",
                 arm.name
             ));
         }

@@ -62,8 +62,8 @@ impl TorqueModel {
         self.additions.payloads.last().filter(|p| p.end_time.iter().all(Option::is_none))
     }
 
-    /// The rigid arm for control laws, with the payload that it holds, at its encoders' positions; `None` where it has not `N`
-    /// joints. `body` is the arm with the model's changes.
+    /// The rigid arm for control laws, with the payload that it holds, at its encoders' positions; `None`
+    /// where it has not `N` joints. `body` is the arm with the model's changes.
     ///
     /// # Errors
     /// Those of [`dyngen::Model::function`].

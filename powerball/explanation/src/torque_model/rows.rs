@@ -1,7 +1,8 @@
 //! The residual of a model along a recording, and the columns of possible changes, which a watch tests.
 //!
-//! Rows are those of a band of [`BAND`]: wide enough that a change shows at once, and narrow enough that neighbouring
-//! rows are nearly independent. A joint has no rows while it rests: friction is not determined there.
+//! Rows are those of a band of [`BAND`]: wide enough that a change shows at once, and narrow enough that
+//! neighbouring rows are nearly independent. A joint has no rows while it rests: friction is not determined
+//! there.
 
 use super::TorqueModel;
 use dyngen::arm::ParameterKind;
@@ -19,8 +20,8 @@ const REST: f64 = motion::REST_SPEED;
 /// Step of a joint's zero for its column, rad.
 const MOVED: f64 = 1e-3;
 
-/// Columns of a body in the hand (mass and first moments), of a force at the tool, and of a delay; those of the joints'
-/// zeros follow.
+/// Columns of a body in the hand (mass and first moments), of a force at the tool, and of a delay; those of
+/// the joints' zeros follow.
 pub(super) const PAYLOAD: usize = 4;
 pub(super) const FORCE: usize = 3;
 pub(super) const DELAY: usize = 1;

@@ -80,8 +80,8 @@ impl TorqueModel {
                 _ => continue,
             };
             notes.push(format!(
-                "joint {joint}: {what}; the torque below has its part of the position, not that of its velocity \
-                    and acceleration: \
+                "joint {joint}: {what}; the torque below has its part of the position, not that of its \
+                    velocity and acceleration: \
                  give the motor a reference ahead of the link's by as much"
             ));
         }
@@ -245,8 +245,8 @@ fn coordinates(motors: &Motors) -> String {
         .map(|rows| rows.iter().map(|row| format!("\n    {row:?},")).collect::<String>());
     format!(
         "
-/// Motor i turns at the sum over joints j of `MOTOR_VELOCITIES[i][j]` times their velocities, on the joint's side
-/// of its gear. Friction, encoders and corrections are of the motors.
+/// Motor i turns at the sum over joints j of `MOTOR_VELOCITIES[i][j]` times their velocities, on the joint's
+/// side of its gear. Friction, encoders and corrections are of the motors.
 #[allow(clippy::excessive_precision)]
 pub const MOTOR_VELOCITIES: [[Real; JOINTS]; JOINTS] = [{velocities}
 ];

@@ -176,8 +176,8 @@ impl Stream<'_> {
     }
 }
 
-/// The share of the error beyond the usual that stays with another residual; all of it where the error is a usual one:
-/// then there is nothing that a name could explain.
+/// The share of the error beyond the usual that stays with another residual; all of it where the error is a
+/// usual one: then there is nothing that a name could explain.
 fn left(stretch: &Stretch<'_>, residual: &Signals, from: f64, edges: &[f64]) -> f64 {
     let before = stretch.excess(&stretch.residual, from, edges).0;
     if before > 0.0 { stretch.excess(residual, from, edges).0 / before } else { 1.0 }

@@ -34,8 +34,8 @@ pub(super) fn causes(joints: usize, found: &Differences) -> Vec<Cause> {
     causes
 }
 
-/// The link of which ten inertial parameters explain all that differs, where there is one: the last where it does so
-/// nearly as well as the best.
+/// The link of which ten inertial parameters explain all that differs, where there is one: the last where it
+/// does so nearly as well as the best.
 fn payload(joints: usize, found: &Differences) -> Option<Cause> {
     let loads: Vec<Load> =
         (0..joints).rev().filter_map(|link| Load::of(link, link + 1 == joints, found)).collect();
@@ -68,7 +68,8 @@ fn of_a_body() -> impl Iterator<Item = ParameterKind> {
 }
 
 impl Load {
-    /// By generalised least squares over the minimal set, whose parameters say in their names what they are sums of.
+    /// By generalised least squares over the minimal set, whose parameters say in their names what they are
+    /// sums of.
     fn of(link: usize, last: bool, found: &Differences) -> Option<Load> {
         let sums: Vec<Vec<(Parameter, f64)>> = found
             .parameters
@@ -122,8 +123,8 @@ impl Load {
         for (centre, kind) in com.iter_mut().zip(moments) {
             *centre = value(kind)?[0] / mass;
         }
-        // Products of inertia are the negative of the tensor's elements. About the frame's origin there is more than about
-        // the centre, by m·(|c|²·E − c·cᵀ) (Steiner).
+        // Products of inertia are the negative of the tensor's elements. About the frame's origin there is
+        // more than about the centre, by m·(|c|²·E − c·cᵀ) (Steiner).
         let tensor = [
             (ParameterKind::Ixx, 0, 0),
             (ParameterKind::Ixy, 0, 1),

@@ -94,8 +94,8 @@ impl Differences {
         }
         // Bonferroni: each interval misses with an equal share of the level.
         let p = level / comparisons as f64;
-        // Questions are fewer: each joint's friction, each constant torque, and inertia, which counts twice, as a
-        // payload is what changes most often.
+        // Questions are fewer: each joint's friction, each constant torque, and inertia, which counts twice,
+        // as a payload is what changes most often.
         let inertial = if parameters.is_empty() { 0 } else { 2 };
         let share = level / (inertial + friction.len() + constants.len()) as f64;
         let each = 2.0 * share / parameters.len().max(1) as f64;
@@ -125,8 +125,8 @@ impl Differences {
             }
         });
         let torque = torque(a, b, &place);
-        // A curve that is another one, where all torques together are the same, is what another parameter of the fit made
-        // up for; one of less than no friction is no friction.
+        // A curve that is another one, where all torques together are the same, is what another parameter of
+        // the fit made up for; one of less than no friction is no friction.
         let shows = |f: &FrictionDifference| {
             f.change[1] > -1.0
                 && torque.iter().find(|t| t.joint == f.joint).is_none_or(|t| t.rms > t.expected)
@@ -390,8 +390,8 @@ impl Curves {
         Curves { joint, points, steeper }
     }
 
-    /// The mean over velocities of squared differences over their variance: 1 where the curves differ as their errors
-    /// say.
+    /// The mean over velocities of squared differences over their variance: 1 where the curves differ as
+    /// their errors say.
     pub(super) fn relative_change(&self) -> Option<f64> {
         let of = |p: &Point| p.difference.value.powi(2) / p.difference.variance;
         let all: Vec<f64> = self.points.iter().map(of).filter(|z| z.is_finite()).collect();

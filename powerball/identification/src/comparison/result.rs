@@ -137,8 +137,8 @@ impl TorqueDifference {
             );
         }
         format!(
-            "joint {joint}: the torques of the two models differ by {rms:.3} N·m rms along the logs of A, {:.1} % of the \
-             torque; errors of the fits alone give about {expected:.3} N·m",
+            "joint {joint}: the torques of the two models differ by {rms:.3} N·m rms along the logs of A, \
+             {:.1} % of the torque; errors of the fits alone give about {expected:.3} N·m",
             100.0 * relative
         )
     }
@@ -154,7 +154,8 @@ pub enum Cause {
         link: usize,
         /// How much heavier `b` is, kg, and its standard error, if the logs determine it.
         mass: Option<[f64; 2]>,
-        /// The size of the difference of first moments about the link's frame, kg·m: of the parts that the logs determine.
+        /// The size of the difference of first moments about the link's frame, kg·m: of the parts that the
+        /// logs determine.
         first_moment: f64,
         /// All of it, where it is on the last link and the logs determine mass and centre.
         body: Option<Body>,
@@ -192,8 +193,8 @@ pub struct Body {
     pub mass_std: f64,
     /// Centre of mass in the last link's frame of the arm file's table, m.
     pub com: [f64; 3],
-    /// Tensor of inertia about the centre of mass along the axes of that frame, kg·m²: xx, xy, xz, yy, yz, zz. `None`
-    /// where the logs do not determine all of it.
+    /// Tensor of inertia about the centre of mass along the axes of that frame, kg·m²: xx, xy, xz, yy, yz,
+    /// zz. `None` where the logs do not determine all of it.
     pub inertia: Option<[f64; 6]>,
     /// Standard errors of these.
     pub inertia_std: Option<[f64; 6]>,

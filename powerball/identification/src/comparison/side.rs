@@ -14,7 +14,7 @@ use std::path::Path;
 /// A fit that is compared with another one.
 #[derive(Clone, Debug)]
 pub struct Side {
-    /// Its name in messages.
+    /// The side's name in messages.
     pub name: String,
     /// The arm's name.
     pub arm: String,

@@ -1,9 +1,10 @@
 //! Two logs of one path: friction compared stroke by stroke, without a model.
 //!
-//! Where two logs run one path, weight and inertia are the same in both, so that the torque against the motion differs by
-//! friction alone. A stroke is a joint's way from one reversal to the next. Its median torque against the motion, less that
-//! of the same stroke of the other log, is one draw of the difference; the mean over strokes forwards and that over strokes
-//! backwards count alike, so that a body or a zero of the torques, whose part turns its sign with the direction, drops out.
+//! Where two logs run one path, weight and inertia are the same in both, so that the torque against the
+//! motion differs by friction alone. A stroke is a joint's way from one reversal to the next. Its median
+//! torque against the motion, less that of the same stroke of the other log, is one draw of the difference;
+//! the mean over strokes forwards and that over strokes backwards count alike, so that a body or a zero of
+//! the torques, whose part turns its sign with the direction, drops out.
 
 use crate::estimate::distribution::{f_tail, t_critical};
 use powerball_logs::log::Log;
@@ -35,13 +36,15 @@ pub(super) struct Change {
     freedom: f64,
 }
 
-/// Slower parts of a stroke than this share of its largest velocity are left out: friction changes with the velocity there.
+/// Slower parts of a stroke than this share of its largest velocity are left out: friction changes with the
+/// velocity there.
 const FAST: f64 = 0.5;
 /// A stroke of fewer samples has no median to speak of.
 const FEWEST_SAMPLES: usize = 8;
 /// Two logs run one path where all but this share of the strokes are alike …
 const OTHERS: f64 = 0.2;
-/// … that is, their ends differ by at most this share of the joint's travel, and their velocities by this share.
+/// … that is, their ends differ by at most this share of the joint's travel, and their velocities by this
+/// share.
 const ALIKE: f64 = 0.05;
 /// Strokes of one log that may have none in the other, in a row.
 const SKIPPED: usize = 4;

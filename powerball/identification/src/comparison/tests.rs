@@ -117,8 +117,8 @@ fn a_payload_is_reported_with_its_mass() {
     assert!(!loaded.friction.iter().any(|f| f.differs), "{}", loaded.sentence);
 }
 
-/// The built-in arm's last link has declared symmetries, which a load need not have: without them the whole body is
-/// determined.
+/// The built-in arm's last link has declared symmetries, which a load need not have: without them the whole
+/// body is determined.
 #[test]
 fn a_payload_of_an_arm_without_symmetries_is_a_whole_body() {
     let text = include_str!("../../../lwa4p.toml");
@@ -182,8 +182,8 @@ fn what_cannot_be_compared_is_reported() {
     }
 }
 
-/// A tenth of a joint's friction is seen between two logs of one path, with its sign, also where the other arm holds a body;
-/// the same arm on the same path again is the same.
+/// A tenth of a joint's friction is seen between two logs of one path, with its sign, also where the other
+/// arm holds a body; the same arm on the same path again is the same.
 #[test]
 fn a_tenth_of_friction_is_seen_along_one_path() {
     let chain = Chain::new(&lwa4p::arm().unwrap());

@@ -173,14 +173,16 @@ fn arm_file(facts: &Facts<'_>) -> Answer {
     }
     if good {
         let fits = "No other convention and no other sign of an a, d or alpha fits clearly better; where a \
-            joint's error is more than 25 %, no quarter turn of theta and no other direction of gravity does.";
+            joint's error is more than 25 %, no quarter turn of theta and no other direction of gravity \
+            does.";
         return plain("arm file", Some(true), fits.into());
     }
     plain(
         "arm file",
         None,
-        "One rigid arm of this file with textbook friction does not fit, whatever single thing is changed about the \
-            columns or the file: it may be the file of another arm, or the torques hold something else."
+        "One rigid arm of this file with textbook friction does not fit, whatever single thing is changed \
+            about the columns or the file: it may be the file of another arm, or the torques hold something \
+            else."
             .into(),
     )
 }
@@ -317,8 +319,8 @@ fn size(facts: &Facts<'_>) -> Answer {
             Some(false),
             format!(
                 "Torques are too small for an arm of this size: {figure}; torques before the gear (then each \
-                    is to be multiplied by its rotor_ratio), currents (by its torque constant) or counts look \
-                    like this."
+                    is to be multiplied by its rotor_ratio), currents (by its torque constant) or counts \
+                    look like this."
             ),
         ),
         (_, Scale::Unknown) => plain(

@@ -1,10 +1,10 @@
 //! Whether the arm file belongs to this arm: the other convention, a sign of its table, a zero a quarter turn
 //! off, gravity from another side.
 //!
-//! Each answer is an arm with one thing changed, judged like a reading of the columns: one rigid arm and textbook
-//! friction, fitted to one part of the logs and judged by the other. Its columns are numeric Newton–Euler: to derive
-//! every such arm would take half a minute. The arm that is reported is derived then, and its columns are
-//! evaluated like those of any other arm.
+//! Each answer is an arm with one thing changed, judged like a reading of the columns: one rigid arm and
+//! textbook friction, fitted to one part of the logs and judged by the other. Its columns are numeric
+//! Newton–Euler: to derive every such arm would take half a minute. The arm that is reported is derived then,
+//! and its columns are evaluated like those of any other arm.
 //!
 //! [`Change`] is one property of a log's columns that may differ from the declared one.
 
@@ -23,8 +23,9 @@ use powerball_logs::regression::{Recording, newton_euler};
 const NOTICED: f64 = 0.02;
 /// If there are more changes than this, those that fit best on few rows are tested on more.
 const LISTED: usize = 20;
-/// A change is clear where squared errors fall to this share, as the geometric mean over joints, both ways round. The
-/// files of eight measured arms have none that is; of the UR10e's the best comes to 0.95 (docs/conventions.md).
+/// A change is clear where squared errors fall to this share, as the geometric mean over joints, both ways
+/// round. The files of eight measured arms have none that is; of the UR10e's the best comes to 0.95
+/// (docs/conventions.md).
 const CLEAR: f64 = 0.8;
 /// Changes whose squared errors differ by less, as the mean over joints, are not distinguished.
 const ALIKE: f64 = 1.1;

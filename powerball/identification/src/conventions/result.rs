@@ -23,11 +23,12 @@ pub struct Conventions {
     /// correction is unknown.
     #[serde(rename = "mend")]
     pub suggested_map: Option<String>,
-    /// The line of the arm file that would set it right; `None` where nothing speaks clearly against the file.
+    /// The line of the arm file that would set it right; `None` where nothing speaks clearly against the
+    /// file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub arm_file: Option<String>,
-    /// Held-out error by joint with all that was found set right, a share of the torque; not a number where a joint
-    /// does not move. Not part of the JSON: see each answer.
+    /// Held-out error by joint with all that was found set right, a share of the torque; not a number where a
+    /// joint does not move. Not part of the JSON: see each answer.
     #[serde(skip)]
     pub left: Vec<f64>,
     /// The answers to all questions, in order.
@@ -154,7 +155,8 @@ impl Conventions {
         self.left.iter().any(|left| *left > MUCH)
     }
 
-    /// The joints of which more than half of the torque is left with all that was found set right, with that share.
+    /// The joints of which more than half of the torque is left with all that was found set right, with that
+    /// share.
     fn joints_with_much_left(&self) -> Option<String> {
         let much = |(j, left): (usize, &f64)| {
             (*left > MUCH).then(|| format!("{:.0} % of joint {}", 100.0 * left, JointNumber::from_index(j)))

@@ -24,8 +24,8 @@ pub fn p_of_sum(changes: &[f64], constant: f64) -> f64 {
 }
 
 /// Probability that chance makes coefficients as large: the Wald test with blocks as clusters (Liang and
-/// Zeger, Biometrika 1986). `square` is the k × k matrix of the columns' weighted products; `scores` has for each
-/// block the k weighted products of the columns with the residual that the coefficients leave. A
+/// Zeger, Biometrika 1986). `square` is the k × k matrix of the columns' weighted products; `scores` has for
+/// each block the k weighted products of the columns with the residual that the coefficients leave. A
 /// coefficient of zero is one that is not there.
 #[must_use]
 pub fn p_of_coefficients(theta: &[f64], square: &Mat<f64>, scores: &[Vec<f64>]) -> f64 {
@@ -67,7 +67,8 @@ mod tests {
         assert_eq!(p_of_sum(&[1.0; 8], 0.0), 1.0, "equal blocks are no sample");
     }
 
-    /// Under the null each level is exceeded as often as it says, with residuals that are alike within a block.
+    /// Under the null each level is exceeded as often as it says, with residuals that are alike within a
+    /// block.
     #[test]
     fn coefficients_of_noise_are_significant_as_often_as_stated() {
         const BLOCKS: usize = 40;

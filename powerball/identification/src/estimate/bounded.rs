@@ -88,8 +88,8 @@ impl<W: Fn(usize) -> bool> Problem<'_, W> {
         x.iter().enumerate().map(|(k, value)| self.gram[(c, k)] * value).sum()
     }
 
-    /// How fast the error falls where a held coefficient grows, for a column of length 1; `None` where it does not, or
-    /// by rounding alone.
+    /// How fast the error falls where a held coefficient grows, for a column of length 1; `None` where it
+    /// does not, or by rounding alone.
     fn slope(&self, c: usize, x: &[f64]) -> Option<f64> {
         let size: f64 = x.iter().enumerate().map(|(k, value)| (self.gram[(c, k)] * value).abs()).sum();
         let slope = self.right[c] - self.product(c, x);
@@ -134,7 +134,8 @@ mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
 
-    /// The best of all choices of what is held: each is solved, and of those within the bounds the least error counts.
+    /// The best of all choices of what is held: each is solved, and of those within the bounds the least
+    /// error counts.
     fn by_enumeration(problem: &Problem<'_, impl Fn(usize) -> bool>) -> f64 {
         let all = problem.non_negative;
         let held = |mask: usize| -> Vec<usize> {
@@ -145,7 +146,8 @@ mod tests {
         errors.fold(f64::INFINITY, f64::min)
     }
 
-    /// Random problems, among them some of nearly and exactly dependent columns, and of columns of very different lengths.
+    /// Random problems, among them some of nearly and exactly dependent columns, and of columns of very
+    /// different lengths.
     #[test]
     fn no_choice_of_what_is_held_is_better() {
         let mut rng = chacha20::ChaCha8Rng::seed_from_u64(6);

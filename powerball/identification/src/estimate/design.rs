@@ -360,8 +360,8 @@ impl Folds {
 
 // Columns that are added to a design: their products with it, from which the fit with them is a small solve.
 //
-// With the base's columns A, the added ones C and a signal y the normal equations of both need A'C, C'C and C'y
-// in addition to those of A (partitioned regression: Frisch and Waugh 1933).
+// With the base's columns A, the added ones C and a signal y the normal equations of both need A'C, C'C and
+// C'y in addition to those of A (partitioned regression: Frisch and Waugh 1933).
 
 /// Weighted products of k added columns.
 #[derive(Clone, Debug)]
@@ -381,8 +381,8 @@ impl Added {
         Added { cross: vec![vec![0.0; size]; k], square: Mat::zeros(k, k), right: vec![0.0; k] }
     }
 
-    /// Adds some rows of a joint; `signal` is y on all rows of the joint. A column that does not act on the joint is
-    /// zero there.
+    /// Adds some rows of a joint; `signal` is y on all rows of the joint. A column that does not act on the
+    /// joint is zero there.
     pub fn add_rows(
         &mut self,
         design: &Design,

@@ -60,8 +60,8 @@ pub struct JointFriction {
     /// Standard errors of γ1 … γ5; null where not determined or at a bound.
     #[serde(default)]
     pub std: [Option<f64>; 5],
-    /// Standard error of the Coulomb friction γ1 + γ3, N·m: where both bend alike the logs determine the sum far
-    /// better than either. Left out where it is not known.
+    /// Standard error of the Coulomb friction γ1 + γ3, N·m: where both bend alike the logs determine the sum
+    /// far better than either. Left out where it is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coulomb_std: Option<f64>,
 }
@@ -106,8 +106,8 @@ pub struct ResidualStats {
     pub rms: Vec<f64>,
     /// rms of the error over rms of the measured torque.
     pub relative: Vec<f64>,
-    /// rms of the error over the standard deviation of the measured torque; empty where that is not known. Not part of
-    /// the JSON.
+    /// rms of the error over the standard deviation of the measured torque; empty where that is not known.
+    /// Not part of the JSON.
     #[serde(skip)]
     pub of_deviation: Vec<f64>,
     /// The end of the band in which the errors are, Hz, by joint: they are those from 0 to there.
@@ -153,8 +153,8 @@ impl ResidualStats {
         })
     }
 
-    /// The joints that are predicted no better than by the mean of their torque; where that is not known, than by
-    /// nothing.
+    /// The joints that are predicted no better than by the mean of their torque; where that is not known,
+    /// than by nothing.
     #[must_use]
     pub fn useless_joints(&self) -> Vec<JointNumber> {
         let ratios = if self.of_deviation.is_empty() { &self.relative } else { &self.of_deviation };

@@ -103,8 +103,8 @@ impl Fit {
     }
 }
 
-/// A base model that is known, seen as a fit of some data: its parameters and γ1 … γ5 by joint as coefficients, and
-/// nothing free.
+/// A base model that is known, seen as a fit of some data: its parameters and γ1 … γ5 by joint as
+/// coefficients, and nothing free.
 #[must_use]
 pub fn known(data: &Data<'_>, inertial: &[f64], gammas: &[[f64; 5]]) -> Fit {
     let shapes: Vec<[f64; 2]> = gammas.iter().map(|[_, g2, _, g4, _]| [*g2, *g4]).collect();

@@ -151,7 +151,8 @@ impl NormalEquations {
         own
     }
 
-    /// Adds columns and their signal times a weight; `places[i]` is where column i stands among all coefficients.
+    /// Adds columns and their signal times a weight; `places[i]` is where column i stands among all
+    /// coefficients.
     pub fn add_columns(
         &mut self,
         places: &[usize],

@@ -1,17 +1,17 @@
 //! The spectrum of a noise from its powers by octave.
 //!
-//! Haar's octaves are not sharp: each sees some of its neighbours, most of all the slower ones' power. A noise of
-//! colour then looks flatter than it is, and where a motion stands in slow octaves and leaks into fast ones, the
-//! fast ones' smaller power counts for a part of it. Both are known: a wave of frequency f leaves the share E_g(f)
-//! of its square in octave g, whatever else is in the signal. With a spectrum S(f) = Σ_h μ_h·E_h(f) the mean power
-//! in octave g is
+//! Haar's octaves are not sharp: each sees some of its neighbours, most of all the slower ones' power. A
+//! noise of colour then looks flatter than it is, and where a motion stands in slow octaves and leaks into
+//! fast ones, the fast ones' smaller power counts for a part of it. Both are known: a wave of frequency f
+//! leaves the share E_g(f) of its square in octave g, whatever else is in the signal. With a spectrum S(f) =
+//! Σ_h μ_h·E_h(f) the mean power in octave g is
 //!
 //! λ_g = Σ_h K_gh·μ_h, K_gh = ∫E_g·E_h df / ∫E_g df,
 //!
-//! and a column that leaves the square D_g in octave g takes Σ_g μ_g·D_g of the noise, as if the octaves were sharp
-//! and their powers were the μ. These are the most likely ones for powers λ that are known with some degrees of
-//! freedom each (Whittle's likelihood), by multiplicative steps (Févotte, Bertin and Durrieu 2009, Neural Computation
-//! 21: Itakura–Saito's divergence), which keep them positive.
+//! and a column that leaves the square D_g in octave g takes Σ_g μ_g·D_g of the noise, as if the octaves were
+//! sharp and their powers were the μ. These are the most likely ones for powers λ that are known with some
+//! degrees of freedom each (Whittle's likelihood), by multiplicative steps (Févotte, Bertin and Durrieu 2009,
+//! Neural Computation 21: Itakura–Saito's divergence), which keep them positive.
 //!
 //! The module also estimates the error that no model can avoid.
 
@@ -38,8 +38,8 @@ pub(super) struct Power {
 /// K, for as many octaves as there are.
 static LEAKS: LazyLock<[[f64; OCTAVES]; OCTAVES]> = LazyLock::new(leaks);
 
-/// E_g at a frequency in periods a row: the squared gain of Haar's g-th wavelet over its length; the last octave
-/// holds all sums that are left.
+/// E_g at a frequency in periods a row: the squared gain of Haar's g-th wavelet over its length; the last
+/// octave holds all sums that are left.
 fn shares(frequency: f64) -> [f64; OCTAVES] {
     let one = (PI * frequency).sin().powi(2);
     std::array::from_fn(|g| {
@@ -183,8 +183,9 @@ mod tests {
         }
     }
 
-    /// The variance of a wave's coefficient, Σ of its covariance with every row, under a noise that forgets within
-    /// some rows: by the octaves' powers as they are up to a third too small, by the sharpened ones right.
+    /// The variance of a wave's coefficient, Σ of its covariance with every row, under a noise that forgets
+    /// within some rows: by the octaves' powers as they are up to a third too small, by the sharpened ones
+    /// right.
     #[test]
     fn a_column_takes_the_noise_of_its_frequency() {
         let rows = 2 << OCTAVES;

@@ -156,12 +156,12 @@ struct Group {
     turned: Mat<f64>,
 }
 
-/// The variance of a coefficient over that which it would have alone; above this, double precision holds no digit of
-/// the friction at a velocity, in which large coefficients cancel each other.
+/// The variance of a coefficient over that which it would have alone; above this, double precision holds no
+/// digit of the friction at a velocity, in which large coefficients cancel each other.
 const INFLATION: f64 = 1e10;
 
-/// The normal equations over the columns that are determined. Where both terms of a joint's friction have nearly one
-/// steepness, its columns depend on each other, and the first term stands for both.
+/// The normal equations over the columns that are determined. Where both terms of a joint's friction have
+/// nearly one steepness, its columns depend on each other, and the first term stands for both.
 fn determined(solution: &Solution) -> Solver {
     let (products, layout) = (solution.products(), solution.layout);
     let solver = products.solver(|c| solution.free[c]);
@@ -178,8 +178,8 @@ fn determined(solution: &Solution) -> Solver {
 
 /// The errors of a solution.
 ///
-/// With H = L·Lᵀ everything is computed in the coordinates L⁻¹·x, in which columns that nearly depend on each other
-/// lose no digits; H⁻¹ itself is never formed.
+/// With H = L·Lᵀ everything is computed in the coordinates L⁻¹·x, in which columns that nearly depend on each
+/// other lose no digits; H⁻¹ itself is never formed.
 #[must_use]
 pub fn standard_errors(solution: &Solution) -> StandardErrors {
     let size = solution.layout.size();

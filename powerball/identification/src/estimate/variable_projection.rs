@@ -1,8 +1,8 @@
 //! A fit by variable projection: linear parameters by weighted least squares, friction steepnesses by
 //! Gauss–Newton.
 //!
-//! It requires of its rows only their cross products at given steepnesses, so rows in memory and reduced logs
-//! are fitted alike.
+//! Variable projection needs of the rows only their cross products at given steepnesses, so rows in memory
+//! and reduced logs are fitted alike.
 //!
 //! The module also has the steepnesses γ2, γ4 of the tanh model, and the trait for rows of a regression whose
 //! friction steepnesses are free.

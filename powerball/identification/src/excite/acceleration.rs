@@ -39,8 +39,8 @@ pub(super) fn proposed(arm: &Arm, masses: Option<&MassSource>) -> Result<(Arm, O
         }
     }
     let note = format!(
-        "the arm file limits no acceleration of {} joints: half of the torque over the largest B_ii is taken, rad/s² \
-         (m/s²): {}",
+        "the arm file limits no acceleration of {} joints: half of the torque over the largest B_ii is \
+         taken, rad/s² (m/s²): {}",
         said.len(),
         said.join(", ")
     );

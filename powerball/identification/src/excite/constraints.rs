@@ -154,7 +154,7 @@ impl Constraints {
 }
 
 /// All that a path passes through: its series once at full velocity, and with `ends` its start and stop too.
-/// Those go along the same curve, but accelerate otherwise.
+/// Such trajectories go along the same curve, but accelerate otherwise.
 fn whole(path: &Fourier, ends: bool) -> Motion {
     let mut motion = Motion::new(path.joints.len(), 1.0 / RATE);
     let count = |time: f64| (time * RATE).ceil() as usize;

@@ -28,8 +28,8 @@ pub use trajectories::{Collision, ExciteOptions, Excited, MassSource, Trajectory
 pub enum Error {
     /// The arm file does not say what the joints may do.
     #[error(
-        "{0}. The acceleration of a joint that has a `torque` limit can be taken from that: give the masses with \
-                 --values (`dyngen import` writes ARM.values.json)"
+        "{0}. The acceleration of a joint that has a `torque` limit can be taken from that: give the masses \
+                 with --values (`dyngen import` writes ARM.values.json)"
     )]
     Limits(MissingLimits),
     /// The arm's model or its regressor cannot be derived.

@@ -1,6 +1,7 @@
 //! Logs and summaries, taken in one after another: the sufficient statistics of each mounting of the base.
 //!
-//! Also here: arm and logs of one mounting, read at once; the samples of all logs of a computation, read at once.
+//! Also here: arm and logs of one mounting, read at once; the samples of all logs of a computation, read at
+//! once.
 
 use super::result::IdentifyError;
 use crate::conventions::{Conventions, conventions};
@@ -310,7 +311,8 @@ impl<'a> Gathering<'a> {
         if room > 0 {
             if log.t.len() > room {
                 self.warnings.push(format!(
-                    "{name}: figures, and what its columns are, are of its first {room} samples of {}; the fit is of all",
+                    "{name}: figures, and what its columns are, are of its first {room} samples of {}; the \
+                    fit is of all",
                     log.t.len()
                 ));
             }

@@ -1,7 +1,7 @@
 //! What a model leaves of the validation set, each joint in the band in which it was fitted.
 //!
-//! Also here: what one set of parameters leaves of the logs of each mounting; whether friction that differs with the
-//! direction is what a poor fit lacks; logs prepared in the band of each joint.
+//! Also here: what one set of parameters leaves of the logs of each mounting; whether friction that differs
+//! with the direction is what a poor fit lacks; logs prepared in the band of each joint.
 
 use super::IdentifyOptions;
 use super::fit::{Along, Fitted, fit};
@@ -158,8 +158,8 @@ const HELPS: f64 = 0.7;
 /// and does not where another joint's grows to this many times.
 const HARMS: f64 = 1.1;
 
-/// What `--friction asymmetric` would do to a fit that leaves more than half of a joint's torque; `None` where nothing is
-/// that poor, or it would not help.
+/// What `--friction asymmetric` would do to a fit that leaves more than half of a joint's torque; `None`
+/// where nothing is that poor, or it would not help.
 pub(super) fn advice(
     gathered: &Gathered,
     identified: &Identified,
@@ -188,8 +188,8 @@ pub(super) fn advice(
     };
     let which = if identified.validate.is_some() { "held-out error" } else { "error of the fit" };
     Ok(Some(format!(
-        "Friction that differs with the direction (--friction asymmetric) lowers the {which} of joint {} from {} to {} % \
-         of the torque.",
+        "Friction that differs with the direction (--friction asymmetric) lowers the {which} of joint {} \
+         from {} to {} % of the torque.",
         joints.join(", "),
         percent(now).join(", "),
         percent(&with).join(", ")
@@ -236,8 +236,8 @@ pub(super) fn unusable(
 
 // Logs prepared in the band of each joint.
 
-/// Logs prepared in every band that a joint has, widest first, with the joints of that band, from 0: one band at a time, as each
-/// takes many times the memory of its logs.
+/// Logs prepared in every band that a joint has, widest first, with the joints of that band, from 0: one band
+/// at a time, as each takes many times the memory of its logs.
 pub(crate) fn by_band<'a>(
     body: &'a RigidArm,
     logs: &'a [Log],

@@ -1,7 +1,7 @@
 //! From logs to a model: one function, and what it takes and gives.
 //!
-//! `gather` makes sufficient statistics of logs, by mounting; `fit` fits them and makes what a page
-//! shows of the fit; `judge` says what it leaves of each mounting and of other logs, and whether another friction law
+//! `gather` makes sufficient statistics of logs, by mounting; `fit` fits them and makes what a page shows of
+//! the fit; `judge` says what it leaves of each mounting and of other logs, and whether another friction law
 //! would help; `result` holds all of it.
 
 mod fit;
@@ -32,8 +32,8 @@ pub use result::{Identified, IdentifyError};
 /// Fits the minimal inertial set and the friction of every joint (Eq. 16) to logs, and judges them on the
 /// logs of another path, `validate`, where there are any.
 ///
-/// `logs` are [`Log`](powerball_logs::log::Log)s, or [`Source`]s where some are files, summaries, or of a base
-/// that was mounted otherwise.
+/// `logs` are [`Log`](powerball_logs::log::Log)s, or [`Source`]s where some are files, summaries, or of a
+/// base that was mounted otherwise.
 ///
 /// ```
 /// use powerball_identification::{IdentifyOptions, identify};

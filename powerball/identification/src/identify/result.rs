@@ -42,7 +42,8 @@ pub struct Identified {
     pub validate: Option<ResidualStats>,
     /// Whether a real arm can have these values.
     pub physically_consistent: bool,
-    /// The share of poses at which the mass matrix of these values is not positive definite; not part of the JSON.
+    /// The share of poses at which the mass matrix of these values is not positive definite; not part of the
+    /// JSON.
     #[serde(skip)]
     pub indefinite: f64,
     /// The nearest values that a real arm can have, with what that costs.

@@ -1,10 +1,10 @@
-//! What one joint has to move along a log: τ = inertia·q̈ + rest(q) in the joint's own angle, next to the measured motion of
-//! all others.
+//! What one joint has to move along a log: τ = inertia·q̈ + rest(q) in the joint's own angle, next to the
+//! measured motion of all others.
 //!
-//! The joint's own inertia does not depend on its own angle, and the rest (gravity, and what the others' motion does to it)
-//! is a trigonometric polynomial of degree two in it: every entry of an inertia tensor that is turned by q is. Five angles
-//! therefore determine it exactly, whatever the arm. The joint's own speed enters the rest as measured: for an arm of one
-//! joint it does not enter at all.
+//! The joint's own inertia does not depend on its own angle, and the rest (gravity, and what the others'
+//! motion does to it) is a trigonometric polynomial of degree two in it: every entry of an inertia tensor
+//! that is turned by q is. Five angles therefore determine it exactly, whatever the arm. The joint's own
+//! speed enters the rest as measured: for an arm of one joint it does not enter at all.
 
 use powerball_logs::log::ServoLog;
 use powerball_logs::regression::RigidArm;
@@ -45,8 +45,8 @@ impl Moved {
     }
 }
 
-/// What a joint has to move along one piece of a log, for a value of 1 of each inertial parameter: one entry a parameter
-/// where nothing changes with time (an arm of one joint), else one for each sample and parameter.
+/// What a joint has to move along one piece of a log, for a value of 1 of each inertial parameter: one entry
+/// a parameter where nothing changes with time (an arm of one joint), else one for each sample and parameter.
 #[derive(Clone, Debug)]
 pub(super) struct Body {
     terms: Vec<Moved>,

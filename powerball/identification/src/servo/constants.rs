@@ -83,7 +83,7 @@ pub const ALL: [(Constant, &str, &str); COUNT] = [
 ];
 
 impl Constant {
-    /// Its name in results.
+    /// The constant's name in results.
     #[must_use]
     pub fn name(self) -> &'static str {
         ALL[self as usize].1
@@ -95,7 +95,8 @@ impl Constant {
         matches!(self, Torque | BackEmf | Armature | Coulomb | Viscous | Stribeck)
     }
 
-    /// Its unit. Where nothing says how large torques are, they are shares of the torque at full duty.
+    /// The constant's unit. Where nothing says how large torques are, they are shares of the torque at full
+    /// duty.
     #[must_use]
     pub fn unit(self, absolute: bool) -> &'static str {
         match (absolute, self) {
@@ -151,11 +152,11 @@ impl Constants {
 /// A constant or an inertial parameter as it was found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Found {
-    /// Its name.
+    /// The constant's name.
     pub name: String,
-    /// Its value.
+    /// The constant's value.
     pub value: f64,
-    /// Its standard error; `None` where the arm file gives it or the logs do not show it.
+    /// The standard error; `None` where the arm file gives it or the logs do not show it.
     pub std: Option<f64>,
     /// The unit of both.
     pub unit: String,

@@ -1,9 +1,10 @@
 //! Output error: constants for which the simulated positions lie nearest to the measured ones.
 //!
-//! Levenberg–Marquardt on the soft absolute value 2c²·(√(1 + (r/c)²) − 1) of each error r (Triggs et al., *Bundle Adjustment*,
-//! 2000, section 4 for its weights): an error below c counts as a square, one above it as its size, so that a joint that
-//! stops elsewhere does not decide the fit alone. Derivatives are central differences: dry friction leaves small steps in
-//! the positions, and a step that is too short sees nothing else.
+//! Levenberg–Marquardt on the soft absolute value 2c²·(√(1 + (r/c)²) − 1) of each error r (Triggs et al.,
+//! *Bundle Adjustment*, 2000, section 4 for its weights): an error below c counts as a square, one above it
+//! as its size, so that a joint that stops elsewhere does not decide the fit alone. Derivatives are central
+//! differences: dry friction leaves small steps in the positions, and a step that is too short sees nothing
+//! else.
 
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
@@ -25,7 +26,7 @@ const LOST: f64 = 10.0;
 pub struct Free {
     /// About how large it is: its unit in the fit.
     pub scale: f64,
-    /// It stays at or above this.
+    /// The value stays at or above this.
     pub least: f64,
 }
 

@@ -1,11 +1,11 @@
 //! Arms on position servos, whose logs hold set-points and positions and no torque.
 //!
-//! The closed loop of each joint is simulated next to the measured motion of the others, and its constants are those whose
-//! positions lie nearest to the measured ones ([`fit`]). Which constants the positions show at all: without any known mass or
-//! motor, torques are known as shares of the torque at full duty only (the equation of motion may be multiplied by any
-//! number); one known body, or `torque_constant`, `resistance` and `supply` of the motor, makes all of them absolute. With
-//! unknown bodies the armature is part of them; where the drive is never switched off, back-EMF and viscous friction are
-//! known as their sum.
+//! The closed loop of each joint is simulated next to the measured motion of the others, and its constants
+//! are those whose positions lie nearest to the measured ones ([`fit`]). Which constants the positions show
+//! at all: without any known mass or motor, torques are known as shares of the torque at full duty only (the
+//! equation of motion may be multiplied by any number); one known body, or `torque_constant`, `resistance`
+//! and `supply` of the motor, makes all of them absolute. With unknown bodies the armature is part of them;
+//! where the drive is never switched off, back-EMF and viscous friction are known as their sum.
 
 mod body;
 pub mod constants;
@@ -52,8 +52,8 @@ impl ServoArm {
     /// Of an arm file, and values of its inertial parameters where they are known.
     ///
     /// # Errors
-    /// Arms that are not simulated here (prismatic joints, motors that turn with several joints), and values that are not the
-    /// arm's.
+    /// Arms that are not simulated here (prismatic joints, motors that turn with several joints), and values
+    /// that are not the arm's.
     pub fn new(arm: &Arm, values: Option<&Values>) -> Result<ServoArm, IdentifyError> {
         if let Some(j) = arm.moving_joints().position(|joint| joint.kind == JointKind::Prismatic) {
             return Err(IdentifyError::Known(format!(
@@ -63,7 +63,9 @@ impl ServoArm {
         }
         if !arm.transmissions.is_empty() {
             return Err(IdentifyError::Known(
-                "the arm file has a [[transmission]]: position servos are simulated where each motor turns one joint".into(),
+                "the arm file has a [[transmission]]: position servos are simulated where each motor turns \
+                one joint"
+                    .into(),
             ));
         }
         let body = RigidArm::new(arm)?;
@@ -153,8 +155,8 @@ pub fn rms(errors: &[Vec<f64>]) -> f64 {
     (errors.iter().flatten().map(|r| r * r).sum::<f64>() / count as f64).sqrt()
 }
 
-/// Fits the servo and the friction of every joint to logs of set-points and positions, and judges them on other logs,
-/// `validate`, where there are any.
+/// Fits the servo and the friction of every joint to logs of set-points and positions, and judges them on
+/// other logs, `validate`, where there are any.
 ///
 /// # Errors
 /// Arms and logs that cannot be used: why.
@@ -250,14 +252,15 @@ fn report(result: &mut IdentifiedServos, arm: &ServoArm, joint: &Joint<'_>, j: u
     }
     if !hidden.is_empty() {
         result.warnings.push(format!(
-            "joint {number}: these logs do not show {} alone: record steps and fast paths, and one where the drive is switched off",
+            "joint {number}: these logs do not show {} alone: record steps and fast paths, and one where the \
+            drive is switched off",
             hidden.join(", ")
         ));
     }
     if !absolute {
         result.warnings.push(format!(
-            "joint {number}: nothing says how large torques are: they are shares of the torque at full duty; give the arm's masses \
-             (--values) or torque_constant, resistance and supply in [joint.servo]"
+            "joint {number}: nothing says how large torques are: they are shares of the torque at full duty; \
+             give the arm's masses (--values) or torque_constant, resistance and supply in [joint.servo]"
         ));
     }
     result.friction.push(ServoFriction {

@@ -132,7 +132,7 @@ impl<'l> Problem<'l> {
         Some(problem)
     }
 
-    /// The same joint in other logs, with what was found: nothing is fitted there.
+    /// The problem of this joint in other logs, with what was found: nothing is fitted there.
     #[must_use]
     pub fn in_logs<'o>(&self, arm: &RigidArm, logs: &'o [ServoLog], joint: usize) -> Problem<'o> {
         let (tracks, bodies, log) = tracks(arm, logs, joint);
@@ -154,7 +154,7 @@ impl<'l> Problem<'l> {
         }
     }
 
-    /// It, with the tracks of others in addition.
+    /// The problem, with the tracks of others in addition.
     #[must_use]
     pub fn and<'o>(mut self, others: impl IntoIterator<Item = &'o Problem<'l>>) -> Problem<'l>
     where
@@ -169,14 +169,14 @@ impl<'l> Problem<'l> {
         self
     }
 
-    /// It, without the payload that may be fitted.
+    /// The problem, without the payload that may be fitted.
     #[must_use]
     pub fn unloaded(mut self) -> Problem<'l> {
         self.loaded.fill(false);
         self
     }
 
-    /// It, with other things to fit.
+    /// The problem, with other things to fit.
     #[must_use]
     pub fn asking(&self, roles: Vec<Role>) -> Problem<'l> {
         Problem { roles, ..self.clone() }
@@ -311,8 +311,8 @@ impl<'l> Problem<'l> {
         Some((self.clone(), values, free.iter().zip(&factors).map(scaled).collect()))
     }
 
-    /// Where the search begins: scales from how fast the joint moves and the torque of its bodies, on a grid of gain, delay and
-    /// torque, or of inertia where nothing says how large torques are.
+    /// Where the search begins: scales from how fast the joint moves and the torque of its bodies, on a grid
+    /// of gain, delay and torque, or of inertia where nothing says how large torques are.
     fn starts(&self) -> Vec<(Vec<f64>, Vec<Free>)> {
         let fastest = self.fastest();
         let heaviest = self.heaviest(fastest);
@@ -335,8 +335,8 @@ impl<'l> Problem<'l> {
         starts
     }
 
-    /// Inertial parameters by how far from its goal the joint is held, in units of torque·gain: what a slow joint shows without
-    /// any simulation. Empty where none is fitted.
+    /// Inertial parameters by how far from its goal the joint is held, in units of torque·gain: what a slow
+    /// joint shows without any simulation. Empty where none is fitted.
     fn held(&self, delay: f64, fastest: f64) -> Vec<f64> {
         /// Slower than this share of the fastest.
         const SLOW: f64 = 0.1;
@@ -406,8 +406,8 @@ impl<'l> Problem<'l> {
         self.roles.iter().map(one).unzip()
     }
 
-    /// A first value and a scale for each inertial parameter: the strongest one against accelerations makes up the joint's
-    /// inertia, the others are as the held joint shows them.
+    /// A first value and a scale for each inertial parameter: the strongest one against accelerations makes
+    /// up the joint's inertia, the others are as the held joint shows them.
     fn first_inertial(&self, inertia: f64, torque: f64, held: &[f64]) -> Vec<(f64, f64)> {
         let count = self.inertial.len();
         let of_unit = |c: usize| -> (f64, f64) {
@@ -485,8 +485,8 @@ impl<'l> Problem<'l> {
         self.tracks.iter().map(|track| track.t.len().div_ceil(block)).sum()
     }
 
-    /// Errors of the goal that comes later by `delay`, by track, rad: what anybody knows without a model. A drive that is
-    /// switched off has no goal.
+    /// Errors of the goal that comes later by `delay`, by track, rad: what anybody knows without a model. A
+    /// drive that is switched off has no goal.
     #[must_use]
     pub fn goal_errors(&self, delay: f64) -> Vec<Vec<f64>> {
         let of = |track: &Track<'_>| -> Vec<f64> {

@@ -37,7 +37,7 @@ pub struct JointServo {
     pub joint: JointNumber,
     /// Whether torques are in N·m; else they are shares of the torque at full duty.
     pub absolute: bool,
-    /// Its constants: those that were fitted, and those of the arm file.
+    /// The joint's constants: those that were fitted, and those of the arm file.
     pub parameters: Vec<Found>,
 }
 

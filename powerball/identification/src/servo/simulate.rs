@@ -1,14 +1,16 @@
 //! The closed loop of one position servo and what it moves, simulated along a log.
 //!
-//! (I + J)·q̈ = motor − back_emf·q̇ − rest(q) − friction, with motor = torque·u while the drive is switched on. Friction is
-//! coulomb + load·½·|motor + rest| (what the gear carries between the two) + stribeck·exp(−|q̇|/stribeck_velocity), against the
-//! motion, and viscous·q̇ (Duclusaud et al., *Extended Friction Models for the Physics Simulation of Servo Actuators*, 2024).
+//! (I + J)·q̈ = motor − back_emf·q̇ − rest(q) − friction, with motor = torque·u while the drive is switched
+//! on. Friction is coulomb + load·½·|motor + rest| (what the gear carries between the two) +
+//! stribeck·exp(−|q̇|/stribeck_velocity), against the motion, and viscous·q̇ (Duclusaud et al., *Extended
+//! Friction Models for the Physics Simulation of Servo Actuators*, 2024).
 //!
 //! The torque at full duty follows the logged voltage where a supply is given, and Coulomb and viscous
 //! friction follow warmth.
 //!
-//! Velocities are those between the steps of positions (leapfrog, second order). What is proportional to q̇ is solved exactly.
-//! Dry friction brakes a joint until it stops, and beyond that holds it where it can: a joint sticks without chatter.
+//! Velocities are those between the steps of positions (leapfrog, second order). What is proportional to q̇
+//! is solved exactly. Dry friction brakes a joint until it stops, and beyond that holds it where it can: a
+//! joint sticks without chatter.
 
 use super::body::Moved;
 use super::constants::{Constant, Constants};
@@ -64,7 +66,8 @@ impl Track<'_> {
     }
 }
 
-/// The positions of the simulated joint at the times of a track, rad. What it moves is one entry, or one a sample.
+/// The positions of the simulated joint at the times of a track, rad. What it moves is one entry, or one a
+/// sample.
 #[must_use]
 pub fn simulate(track: &Track<'_>, moved: &[Moved], constants: &Constants) -> Vec<f64> {
     let goal = limited(track, constants.of(Constant::SpeedLimit));

@@ -1,4 +1,5 @@
-//! Against another formulation of the same servo, closed forms, the arm's own inverse dynamics, and measured logs.
+//! Against another formulation of the same servo, closed forms, the arm's own inverse dynamics, and measured
+//! logs.
 
 use super::constants::{Constant, Constants};
 use super::simulate::{Track, simulate};
@@ -28,7 +29,8 @@ fn truth() -> Constants {
     set.into_iter().fold(Constants::ideal(), |own, (constant, value)| own.with(constant, value))
 }
 
-/// The same servo by explicit steps of 20 µs and Karnopp's stick: a joint rests while the torque on it is below friction.
+/// The servo by explicit steps of 20 µs and Karnopp's stick: a joint rests while the torque on it is below
+/// friction.
 fn karnopp(
     t: &[f64],
     goal: impl Fn(f64) -> f64,
@@ -139,7 +141,8 @@ fn without_masses_torques_are_shares_of_the_torque_at_full_duty() {
     assert_eq!(found.parameters.len(), 3, "{:?}", found.parameters);
 }
 
-/// Switched off and without friction it is a pendulum; at full duty it runs at torque/back_emf; friction holds it.
+/// Switched off and without friction it is a pendulum; at full duty it runs at torque/back_emf; friction
+/// holds it.
 #[test]
 fn closed_forms_are_met() {
     let arm = ServoArm::new(&pendulum(0.12, "kp = 1"), Some(&point(0.8))).unwrap();
@@ -175,7 +178,8 @@ fn closed_forms_are_met() {
 fn the_body_of_a_joint_is_the_arms_inverse_dynamics() {
     let joint = |a: f64, alpha: &str| {
         format!(
-            "[[joint]]\nkind = \"revolute\"\na = {a}\nalpha = {alpha}\nd = 0.1\ntheta = 0\n[joint.servo]\nkp = 1\n"
+            "[[joint]]\nkind = \"revolute\"\na = {a}\nalpha = {alpha}\nd = 0.1\ntheta = \
+            0\n[joint.servo]\nkp = 1\n"
         )
     };
     let text = format!(
@@ -214,13 +218,15 @@ fn the_body_of_a_joint_is_the_arms_inverse_dynamics() {
 
 #[test]
 fn what_cannot_be_simulated_is_refused() {
-    let text = "name = \"p\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\n[[joint]]\nkind = \"prismatic\"\na = 0\n\
+    let text = "name = \"p\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\n[[joint]]\nkind = \
+        \"prismatic\"\na = 0\n\
                 alpha = 0\nd = 0\ntheta = 0\n";
     let why = ServoArm::new(&Arm::parse(text, "p.toml").unwrap(), None).unwrap_err().to_string();
     assert!(why.contains("joint 1 is prismatic"), "{why}");
 }
 
-/// Extended friction model M6 of Duclusaud et al. with the values that the owners of the logs found for this servo, and a delay.
+/// Extended friction model M6 of Duclusaud et al. with the values that the owners of the logs found for this
+/// servo, and a delay.
 fn m6(log: &ServoLog, (mass, length, kp): (f64, f64, f64), delay: f64) -> Vec<f64> {
     let (k, r, armature, offset, stribeck) = (3.5555, 7.1214, 0.0283, -0.0140, 0.0840);
     let (of_motor, of_body, speed, alpha, viscous) = (0.2892, 0.2985, 0.0748, 1.2952, 0.0762);
@@ -245,7 +251,8 @@ fn m6(log: &ServoLog, (mass, length, kp): (f64, f64, f64), delay: f64) -> Vec<f6
     out.iter().zip(&log.q[0]).map(|(s, q)| s - q).collect()
 }
 
-/// Held-out error of the fit, of M6 as its owners simulate it, and of M6 with the delay that is best for it, rad, of one load and gain.
+/// Held-out error of the fit, of M6 as its owners simulate it, and of M6 with the delay that is best for it,
+/// rad, of one load and gain.
 fn held_out(measured: &Measured, (name, mass): (&str, f64), length: f64, kp: u32) -> [f64; 3] {
     let arm = pendulum(length, &format!("kp = {kp}"));
     let [logs, validate] = [1, 2].map(|repetition| measured.logs((name, length, kp), repetition));
@@ -277,7 +284,8 @@ fn every_load_and_gain_is_predicted_better_than_by_its_owners_model() {
                 let errors = held_out(&measured, mass, length, kp);
                 let [own, m6, delayed] = errors;
                 println!(
-                    "{} kg at {length} m, kp {kp}: held out {own:.4} rad, M6 {m6:.4} rad, with a delay {delayed:.4} rad",
+                    "{} kg at {length} m, kp {kp}: held out {own:.4} rad, M6 {m6:.4} rad, with a delay \
+                    {delayed:.4} rad",
                     mass.0
                 );
                 sums.iter_mut().zip(errors).for_each(|(sum, error)| *sum += error);

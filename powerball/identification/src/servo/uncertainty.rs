@@ -1,8 +1,9 @@
 //! How well the constants of a servo are known: standard errors under coloured errors.
 //!
-//! What a simulation leaves is the same sign for half a second and more, and its size changes from one motion to the next. The
-//! sandwich (JᵀWJ)⁻¹·(Σ g·gᵀ)·(JᵀWJ)⁻¹ with g = JᵀWr summed over stretches that count as independent holds for any colour within
-//! a stretch (Liang and Zeger, Biometrika 73, 1986), with the factor m/(m − p) for m stretches and p parameters.
+//! What a simulation leaves is the same sign for half a second and more, and its size changes from one motion
+//! to the next. The sandwich (JᵀWJ)⁻¹·(Σ g·gᵀ)·(JᵀWJ)⁻¹ with g = JᵀWr summed over stretches that count as
+//! independent holds for any colour within a stretch (Liang and Zeger, Biometrika 73, 1986), with the factor
+//! m/(m − p) for m stretches and p parameters.
 
 use super::fit::{Free, normal_equations};
 use faer::{Mat, Side};
@@ -12,7 +13,8 @@ const UNSHOWN: f64 = 1e-9;
 /// A parameter of which this share lies in such directions is not shown.
 const UNSHOWN_SHARE: f64 = 1e-3;
 
-/// The standard error of each parameter, in its own unit; `None` where the errors do not change with it alone.
+/// The standard error of each parameter, in its own unit; `None` where the errors do not change with it
+/// alone.
 #[must_use]
 pub fn standard_errors(
     slopes: &[Vec<Vec<f64>>],

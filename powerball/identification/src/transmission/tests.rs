@@ -177,8 +177,8 @@ fn a_column_that_is_not_the_motor_is_refused_in_words() {
     let logs: Vec<Log> = logs
         .iter()
         .map(|(_, log)| {
-            // Joint 1: noise; 2: sound, with a hole; 3: its own velocity; 4: nothing; 5: no number; 6: another
-            // one's.
+            // Joint 1: noise; 2: sound, with a hole; 3: its own velocity; 4: nothing; 5: no number; 6:
+            // another one's.
             let mut motor = log.torque.clone();
             motor[0].iter_mut().for_each(|x| *x = rng.random_range(-1.0..1.0));
             motor[2] = log.q[2].windows(2).map(|q| q[1] - q[0]).chain([0.0]).collect();

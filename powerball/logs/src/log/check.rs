@@ -66,8 +66,8 @@ const AFTER_RESTART: usize = 5;
 /// The gap between the parts of a log whose clock restarts, s.
 pub(super) const RESTART: f64 = 1.0;
 
-/// Lets time run on where a clock restarts: what follows is a piece of its own, as after a gap. Gives the times of these
-/// pieces' first samples.
+/// Lets time run on where a clock restarts: what follows is a piece of its own, as after a gap. Gives the
+/// times of these pieces' first samples.
 fn join_restarts(raw: &mut Raw, file: &str, findings: &mut Vec<Finding>) -> Vec<f64> {
     let (mut restarts, mut first, mut added) = (Vec::new(), None, 0.0);
     let mut before = f64::NEG_INFINITY;
@@ -85,8 +85,8 @@ fn join_restarts(raw: &mut Raw, file: &str, findings: &mut Vec<Finding>) -> Vec<
     let Some((line, before, t)) = first else { return restarts };
     let times = if restarts.len() == 1 { "once".to_string() } else { format!("{} times", restarts.len()) };
     let message = format!(
-        "the clock restarts {times} (first here: {t} s after {before} s): the log is used as {} pieces, and the times \
-         of each go on after those of the one before",
+        "the clock restarts {times} (first here: {t} s after {before} s): the log is used as {} pieces, and \
+         the times of each go on after those of the one before",
         restarts.len() + 1
     );
     findings.push(finding(file, Some(line), "t", message));
@@ -127,7 +127,8 @@ fn sound_step(raw: &Raw, file: &str, findings: &mut Vec<Finding>) -> Result<f64,
     if step >= SLOWEST {
         let unit = time_unit(step);
         let message = format!(
-            "the median step is {step} s: t must be in seconds (this looks like {unit}: --map 't.unit = \"{unit}\"')"
+            "the median step is {step} s: t must be in seconds (this looks like {unit}: --map 't.unit = \
+            \"{unit}\"')"
         );
         return Err(LogError(vec![finding(file, Some(raw.line[1]), "t", message)]));
     }
@@ -219,7 +220,8 @@ fn pieces(
     pieces
 }
 
-/// How far a joint can move in some time, rad or m: five times its speed limit, and always a few steps of an encoder.
+/// How far a joint can move in some time, rad or m: five times its speed limit, and always a few steps of an
+/// encoder.
 pub(super) fn farthest(arm: &Arm, j: usize, seconds: f64) -> f64 {
     (5.0 * arm.joints[j].velocity.unwrap_or(10.0) * seconds).max(0.02)
 }

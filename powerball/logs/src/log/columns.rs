@@ -28,7 +28,8 @@ impl Asked<'_> {
 
 /// What LeRobot calls an arm's positions.
 const LEROBOT: &str = "observation.state";
-/// The quantities with the names that columns have for them: those of this project's own logs, of ROS and of LeRobot.
+/// The quantities with the names that columns have for them: those of this project's own logs, of ROS and of
+/// LeRobot.
 const NAMES: [(&str, &[&str]); 10] = [
     ("q", &["q", "position", LEROBOT]),
     ("dq", &["dq", "velocity", "observation.velocity"]),
@@ -56,12 +57,13 @@ const RTDE: [(&str, &str); 5] = [
 pub(super) const TIMES: [&str; 3] = ["t", "time", "timestamp"];
 
 /// What LeRobot does not state about positions.
-const UNIT_OF_LEROBOT: &str = "LeRobot does not say in which unit observation.state is: rad, degrees from the middle of a \
-    servo's range, or a share of that range from -100 to 100. Say it with --map 'q.unit = \"deg\"' (or \"rad\"); a share of \
-    the range is no angle before it is multiplied by the range ('q.scale = […]')";
-const TORQUE_OF_LEROBOT: &str = ". LeRobot records torques or currents only where the robot was made to give them: name \
-    their column with --map 'tau.column = \"…\"' or 'i.column = \"…\"'; `action` is a set-point, and without torques \
-    `identify` and `explain` take the joints for position servos";
+const UNIT_OF_LEROBOT: &str = "LeRobot does not say in which unit observation.state is: rad, degrees from \
+    the middle of a servo's range, or a share of that range from -100 to 100. Say it with --map 'q.unit = \
+    \"deg\"' (or \"rad\"); a share of the range is no angle before it is multiplied by the range ('q.scale = \
+    […]')";
+const TORQUE_OF_LEROBOT: &str = ". LeRobot records torques or currents only where the robot was made to give \
+    them: name their column with --map 'tau.column = \"…\"' or 'i.column = \"…\"'; `action` is a set-point, \
+    and without torques `identify` and `explain` take the joints for position servos";
 
 /// The columns of one quantity by joint, and what each is to be multiplied with.
 pub(super) struct Group {
@@ -337,8 +339,8 @@ impl Columns {
         [&self.t, &self.q, &self.torque].into_iter().chain(optional)
     }
 
-    /// t, q, effort, temperature, motor, those of servos, dq in a row; one of the last four that is no number does not
-    /// spoil the sample.
+    /// t, q, effort, temperature, motor, those of servos, dq in a row; one of the last four that is no number
+    /// does not spoil the sample.
     pub(super) fn sample(&self, number: &impl Fn(usize) -> Option<f64>) -> Option<Vec<f64>> {
         let mut values = Vec::new();
         for group in [&self.t, &self.q, &self.torque] {
@@ -399,8 +401,8 @@ const GOALS_ALONE: &str =
 
 fn missing_goals(missing: &[String], n: usize) -> String {
     format!(
-        "the log of position servos needs their set-points goal1 … goal{n} [rad or m] for each of the {n} joints (or torques, \
-         tau1 … tau{n}); missing: {}",
+        "the log of position servos needs their set-points goal1 … goal{n} [rad or m] for each of the {n} \
+         joints (or torques, tau1 … tau{n}); missing: {}",
         missing.join(", ")
     )
 }
@@ -408,22 +410,22 @@ fn missing_goals(missing: &[String], n: usize) -> String {
 fn one_too_many_message(more: &str, n: usize) -> String {
     let Some(stem) = more.strip_suffix('0') else {
         return format!(
-            "the header has {more}, the arm has {n} joints: another arm's log; where it holds more than this arm, say \
-             which columns are its: --map 'q.column = [\"q1\", …]'"
+            "the header has {more}, the arm has {n} joints: another arm's log; where it holds more than this \
+             arm, say which columns are its: --map 'q.column = [\"q1\", …]'"
         );
     };
     let first: Vec<String> = (0..n).map(|j| format!("\"{stem}{j}\"")).collect();
     format!(
-        "the header has {stem}0 to {stem}{n}, which are {} columns, the arm has {n} joints: another arm's log, or say which \
-         columns are its: --map 'q.column = [{}]' where joints count from 0, --map 'q.column = \"{stem}\"' where they \
-         count from 1 (and tau.column, dq.column likewise)",
+        "the header has {stem}0 to {stem}{n}, which are {} columns, the arm has {n} joints: another arm's \
+         log, or say which columns are its: --map 'q.column = [{}]' where joints count from 0, --map \
+         'q.column = \"{stem}\"' where they count from 1 (and tau.column, dq.column likewise)",
         n + 1,
         first.join(", ")
     )
 }
 
-/// The position column next to those of the arm's joints, where columns are numbered and no map says which are meant: of a
-/// joint after the last one, or of a joint 0.
+/// The position column next to those of the arm's joints, where columns are numbered and no map says which
+/// are meant: of a joint after the last one, or of a joint 0.
 fn one_too_many(names: &[String], asked: Asked<'_>) -> Option<String> {
     let is_said = asked.map.q.column.is_some() || !asked.map.joints.is_empty();
     let next = |stem: &str| format!("{stem}{}", asked.arm.dof() + 1);

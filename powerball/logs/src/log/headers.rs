@@ -1,8 +1,9 @@
-//! Columns of other names: `time`, `joint_1_pos`, `actual_q_0`. What they are by the words in their names, as a column map.
+//! Columns of other names: `time`, `joint_1_pos`, `actual_q_0`. What they are by the words in their names, as
+//! a column map.
 //!
-//! A quantity is a family of columns whose names differ by one number, which counts all joints from 1 or from 0, or by
-//! the joints' names. Where every quantity has one family the log is read so, with a note; else all that is
-//! possible is proposed.
+//! A quantity is a family of columns whose names differ by one number, which counts all joints from 1 or from
+//! 0, or by the joints' names. Where every quantity has one family the log is read so, with a note; else all
+//! that is possible is proposed.
 
 use super::columns::{Asked, group};
 use super::map::{ByJoint, ColumnMap};
@@ -210,7 +211,8 @@ fn numbers(name: &str) -> Vec<(usize, usize)> {
     found
 }
 
-/// The words of a name in small letters: what stands between other characters, numbers, and where a capital letter begins.
+/// The words of a name in small letters: what stands between other characters, numbers, and where a capital
+/// letter begins.
 fn words(name: &str) -> Vec<String> {
     let (mut words, mut small) = (vec![String::new()], false);
     for c in name.chars() {

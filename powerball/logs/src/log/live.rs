@@ -1,5 +1,5 @@
-//! Rows one by one, while they are recorded: found by their column names as those of files, and nothing is known of
-//! what comes after.
+//! Rows one by one, while they are recorded: found by their column names as those of files, and nothing is
+//! known of what comes after.
 
 use super::check::RESTART;
 use super::columns::{Asked, Columns};
@@ -26,7 +26,7 @@ pub struct LiveSample {
 pub enum Taken {
     /// A sample; where the clock `restarted` its time goes on from the last one's.
     Sample {
-        /// It.
+        /// The sample.
         sample: LiveSample,
         /// Whether time fell back before it.
         restarted: bool,

@@ -261,7 +261,8 @@ fn units(key: &str) -> &'static [Unit] {
         "i" => CURRENTS,
         "temp" => TEMPERATURES,
         "volts" => VOLTAGES,
-        // On the motors' side units are anybody's, and loads are shares of whatever the drive takes for the most.
+        // On the motors' side units are anybody's, and loads are shares of whatever the drive takes for the
+        // most.
         _ => &[],
     }
 }

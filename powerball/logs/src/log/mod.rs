@@ -1,8 +1,8 @@
 //! Logs of joint positions and torques: read, checked, and every doubt about them said.
 //!
-//! Files ([`Log::read`]: CSV, Parquet, LeRobot, MCAP, bags of ROS, npz, mat, HDF5), arrays ([`Log::from_arrays`]) and samples
-//! ([`Log::from_samples`]) come to columns by name, and these pass the same checks. A [`ColumnMap`] says what
-//! names do not.
+//! Files ([`Log::read`]: CSV, Parquet, LeRobot, MCAP, bags of ROS, npz, mat, HDF5), arrays
+//! ([`Log::from_arrays`]) and samples ([`Log::from_samples`]) come to columns by name, and these pass the
+//! same checks. A [`ColumnMap`] says what names do not.
 
 mod arrays;
 mod check;

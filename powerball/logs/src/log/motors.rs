@@ -56,7 +56,8 @@ impl Motors {
         times(&self.inverse, false, motors, 1)
     }
 
-    /// Motor torques of joint torques, N·m on the joint's side of the gear: n rows of `width` numbers a sample.
+    /// Motor torques of joint torques, N·m on the joint's side of the gear: n rows of `width` numbers a
+    /// sample.
     #[must_use]
     pub fn torques(&self, joints: &[f64], width: usize) -> Vec<f64> {
         times(&self.inverse, true, joints, width)
@@ -120,8 +121,8 @@ fn motors_note(arm: &Arm) -> Option<String> {
     let coupled: Vec<String> = coupled.iter().map(ToString::to_string).collect();
     (!coupled.is_empty()).then(|| {
         format!(
-            "the arm file's [[transmission]] couples joints {}: friction, errors, bands and effects with these \
-             numbers are those of their motors, on the joints' side of the gears",
+            "the arm file's [[transmission]] couples joints {}: friction, errors, bands and effects with \
+             these numbers are those of their motors, on the joints' side of the gears",
             coupled.join(", ")
         )
     })

@@ -1,7 +1,7 @@
 //! Samples of which one number cannot be: a telegram that was torn, a bit that fell over.
 //!
-//! A few of them are left out, as samples without a number are, and are named. Where there are many the signal is what
-//! it is.
+//! A few of them are left out, as samples without a number are, and are named. Where there are many the
+//! signal is what it is.
 
 use super::Finding;
 use super::read::{Effort, GOAL, Raw};
@@ -46,7 +46,8 @@ pub(super) fn leave_out(
             let what = match is_rare {
                 true => "left out",
                 false => {
-                    "too many to be left out; if they are spikes, identify with --estimator robust, which gives them less weight"
+                    "too many to be left out; if they are spikes, identify with --estimator robust, which \
+                    gives them less weight"
                 }
             };
             let more = match found.len() {

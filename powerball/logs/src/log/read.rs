@@ -1,6 +1,7 @@
 //! Logs found by their column names, from a file of any format.
 //!
-//! Also here: samples as they were read, before any doubt; the samples of a log while it is read, by whatever reader.
+//! Also here: samples as they were read, before any doubt; the samples of a log while it is read, by whatever
+//! reader.
 
 use super::columns::{Asked, Columns};
 use super::map::ColumnMap;
@@ -143,8 +144,8 @@ pub(super) fn rows<T>(
 }
 
 impl Log {
-    /// Reads a log of an arm from a file, CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5, with what is odd about
-    /// it.
+    /// Reads a log of an arm from a file, CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5, with what is
+    /// odd about it.
     ///
     /// # Errors
     /// Why the log cannot be used: no such file, missing columns, no torque constant, units that cannot be
@@ -340,7 +341,8 @@ impl<'a> Samples<'a> {
 }
 
 impl Samples<'_> {
-    /// Takes a whole table, whose columns become the log's without a copy; `time` is the time of its samples where no column is.
+    /// Takes a whole table, whose columns become the log's without a copy; `time` is the time of its samples
+    /// where no column is.
     pub(super) fn table(&mut self, table: Table, time: Option<Vec<f64>>) -> Result<(), LogError> {
         // A message may have a `t` of its own in addition to the time that counts.
         let own = |name: String| if time.is_some() && name == "t" { "t of the message".into() } else { name };

@@ -26,7 +26,8 @@ pub struct ServoLog {
     pub temperature: Option<Vec<Vec<f64>>>,
     /// Voltages of the drives by joint, V, where they were logged; not a number where a sample has none.
     pub volts: Option<Vec<Vec<f64>>>,
-    /// Loads as the drives report them, in whatever unit, where they were logged; not a number where a sample has none.
+    /// Loads as the drives report them, in whatever unit, where they were logged; not a number where a sample
+    /// has none.
     pub load: Option<Vec<Vec<f64>>>,
     /// Whether each drive was switched on, by joint, where that was logged; else it was.
     pub enabled: Option<Vec<Vec<bool>>>,
@@ -50,8 +51,8 @@ impl ServoLog {
         Ok((log, findings))
     }
 
-    /// A log of position servos from columns in memory, named as in a file: `t`, `q1` …, `goal1` …, and where they are there
-    /// `volts1` …, `load1` …, `torque_enable1` …, `temp1` ….
+    /// A log of position servos from columns in memory, named as in a file: `t`, `q1` …, `goal1` …, and where
+    /// they are there `volts1` …, `load1` …, `torque_enable1` …, `temp1` ….
     ///
     /// # Errors
     /// As [`ServoLog::read`].
@@ -96,8 +97,8 @@ impl ServoLog {
     }
 }
 
-/// Whether logs are those of position servos: the first one holds set-points and neither torques nor currents with a constant,
-/// or every joint of the arm has its `[joint.servo]` and there are no torques.
+/// Whether logs are those of position servos: the first one holds set-points and neither torques nor currents
+/// with a constant, or every joint of the arm has its `[joint.servo]` and there are no torques.
 #[must_use]
 pub fn is_of_servos(path: &Path, arm: &Arm, map: &ColumnMap) -> bool {
     let servos = arm.moving_joints().all(|joint| joint.servo.is_some());

@@ -1,11 +1,13 @@
-//! What one log's signals say against themselves, before an arm is asked: logged velocities against positions, levels,
-//! and the signs of torques. What an arm says against the columns is asked by `identification::conventions`.
+//! What one log's signals say against themselves, before an arm is asked: logged velocities against
+//! positions, levels, and the signs of torques. What an arm says against the columns is asked by
+//! `identification::conventions`.
 
 use super::map::velocity_units;
 use super::read::Raw;
 use super::{Doubt, Finding};
 
-// Logged velocities against logged positions: units, signs, columns that were exchanged, and clocks that disagree.
+// Logged velocities against logged positions: units, signs, columns that were exchanged, and clocks that
+// disagree.
 //
 // Velocities are computed from positions; logged ones are used for these checks alone. What a joint moves
 // within half a second is held against the integral of its logged velocity: no derivative is taken, so
@@ -100,7 +102,8 @@ pub(super) fn velocities(raw: &Raw, step: f64, warnings: &mut Warnings<'_>) -> V
     Vec::new()
 }
 
-/// Whether all joints' velocities differ from the slopes of their positions by one factor that is none of a unit.
+/// Whether all joints' velocities differ from the slopes of their positions by one factor that is none of a
+/// unit.
 fn wrong_time(joints: &[Stretches]) -> Option<Doubt> {
     let moves = |joint: &Stretches| joint.moved.iter().any(|x| x.abs() >= STILL);
     let found = joints.iter().enumerate().filter(|(_, joint)| moves(joint));
@@ -123,8 +126,8 @@ fn wrong_time(joints: &[Stretches]) -> Option<Doubt> {
     let pace = if common > 1.0 { factor } else { 1.0 / factor };
     let map = format!("t.scale = {factor}");
     let sentence = format!(
-        "Time runs {pace:.2} times too {}: on all joints that move dq is {:.2} times the slope of q (--map '{map}'; where t is \
-         right dq has another unit, and 'dq.scale = {factor}' says so).",
+        "Time runs {pace:.2} times too {}: on all joints that move dq is {:.2} times the slope of q (--map \
+         '{map}'; where t is right dq has another unit, and 'dq.scale = {factor}' says so).",
         if common > 1.0 { "fast" } else { "slowly" },
         1.0 / factor,
     );
@@ -140,8 +143,8 @@ fn clocks(raw: &Raw, joints: &[Stretches], ratios: &[(usize, f64)], warnings: &m
     let common = all[all.len() / 2];
     if all.len() >= 2 && (common - 1.0).abs() > CLOCKS && most - least < 0.5 * (common - 1.0).abs() {
         let message = format!(
-            "passes {:.1} % too {} for the joints' velocities, on every joint alike: the time base is off (are \
-                these the times of the samples, or a count times a nominal step?)",
+            "passes {:.1} % too {} for the joints' velocities, on every joint alike: the time base is off \
+                (are these the times of the samples, or a count times a nominal step?)",
             100.0 * (common - 1.0).abs(),
             if common > 1.0 { "slowly" } else { "fast" }
         );
@@ -357,7 +360,7 @@ fn mean(x: &[f64]) -> Option<(f64, f64)> {
 pub(super) enum Severity {
     /// The user should know.
     Warning,
-    /// It cannot be used.
+    /// The signal cannot be used.
     Unusable,
 }
 

@@ -79,7 +79,8 @@ fn a_sound_log_is_read_without_findings() {
     assert_eq!(log.q[1][0], 1.0);
 }
 
-/// Recordings of Universal Robots' RTDE: joints from 0, `timestamp`, blanks or commas between columns, and much else.
+/// Recordings of Universal Robots' RTDE: joints from 0, `timestamp`, blanks or commas between columns, and
+/// much else.
 #[test]
 fn rtde_recordings_are_read_by_their_names() {
     let (own, _) = read(&text(HEADER, |_, f| Some(f.join(","))));

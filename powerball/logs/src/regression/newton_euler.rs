@@ -5,8 +5,8 @@ use dyngen::Arm;
 use dyngen::arm::{Convention, JointKind};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-/// The regressor of all eleven parameters of every link, then of every bar (n × p, row-major) at one state, for gravity `g` in the
-/// base frame.
+/// The regressor of all eleven parameters of every link, then of every bar (n × p, row-major) at one state,
+/// for gravity `g` in the base frame.
 pub fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec<f64> {
     let n = arm.dof();
     let motors = arm.motor_velocity_matrix_f64();
@@ -112,7 +112,8 @@ pub fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec
     y
 }
 
-/// A link's frame in the base frame: axes, origin, angular velocity and acceleration, acceleration less gravity.
+/// A link's frame in the base frame: axes, origin, angular velocity and acceleration, acceleration less
+/// gravity.
 #[derive(Clone, Copy)]
 struct Moving {
     r: Matrix3<f64>,
@@ -127,8 +128,8 @@ fn felt_part(felt: bool, v: &Vector3<f64>) -> Vector3<f64> {
     if felt { *v } else { Vector3::zeros() }
 }
 
-/// Force on a link and moment about the origin of its frame for unit mass, first moments and inertias, from its angular
-/// velocity, angular acceleration and acceleration (gravity taken off), all in its frame.
+/// Force on a link and moment about the origin of its frame for unit mass, first moments and inertias, from
+/// its angular velocity, angular acceleration and acceleration (gravity taken off), all in its frame.
 fn link_columns(w: Vector3<f64>, dw: Vector3<f64>, acc: Vector3<f64>) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     let mut columns = vec![(acc, Vector3::zeros())];
     for e in [Vector3::x(), Vector3::y(), Vector3::z()] {

@@ -12,12 +12,12 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 /// How logs are prepared.
 #[derive(Clone, Debug)]
 pub struct DataOptions {
-    /// Band of the regression, Hz: torques and columns pass the same zero-phase low-pass. The noise of accelerations
-    /// grows with its power 2.5.
+    /// Band of the regression, Hz: torques and columns pass the same zero-phase low-pass. The noise of
+    /// accelerations grows with its power 2.5.
     pub cutoff: f64,
-    /// Smoothing of positions before they are differentiated, Hz. Torques pass it as well, so that what is linear in
-    /// the motion is exact in any band. What is not (friction, which changes its sign with the velocity) is made of
-    /// the smoothed motion before it passes the band, so this is far above the band.
+    /// Smoothing of positions before they are differentiated, Hz. Torques pass it as well, so that what is
+    /// linear in the motion is exact in any band. What is not (friction, which changes its sign with the
+    /// velocity) is made of the smoothed motion before it passes the band, so this is far above the band.
     pub smoothing: f64,
     /// Length of a block, s: residuals further apart count as independent.
     pub block: f64,
@@ -44,7 +44,8 @@ pub enum DataError {
 
 /// Everything that regressions over some logs share.
 ///
-/// Where a transmission couples joints, recordings and rows are of motors: see [`Motors`](crate::log::Motors).
+/// Where a transmission couples joints, recordings and rows are of motors: see
+/// [`Motors`](crate::log::Motors).
 #[derive(Debug)]
 pub struct Data<'a> {
     /// The arm's rigid-body functions.
@@ -329,7 +330,8 @@ impl<'a> Data<'a> {
         blocks_of(&self.recordings, &self.joints, &self.band, length)
     }
 
-    /// The ten inertial parameters of a link, or of a bar after them, as columns over all joints; empty where they cannot be had.
+    /// The ten inertial parameters of a link, or of a bar after them, as columns over all joints; empty where
+    /// they cannot be had.
     pub fn link_columns(&self, link: usize) -> &[Column] {
         self.links[link].get_or_init(|| {
             let first = link * ParameterKind::ALL.len();
@@ -338,7 +340,8 @@ impl<'a> Data<'a> {
         })
     }
 
-    /// Torques for unit forces on the tool ([`RigidArm::force_point`]) along the base axes; empty where they cannot be had.
+    /// Torques for unit forces on the tool ([`RigidArm::force_point`]) along the base axes; empty where they
+    /// cannot be had.
     pub fn force_columns(&self) -> &[Column] {
         self.force.get_or_init(|| {
             let all = self.recordings.iter().map(|r| self.body.force_columns(&r.q));
@@ -348,8 +351,9 @@ impl<'a> Data<'a> {
         })
     }
 
-    /// The static torque of every link's mass and first moments, [`PULLED`] a link, under unit gravity along a
-    /// base axis, then of every bar's; empty where they cannot be had. A column has no part on a joint that does not feel it.
+    /// The static torque of every link's mass and first moments, [`PULLED`] a link, under unit gravity along
+    /// a base axis, then of every bar's; empty where they cannot be had. A column has no part on a joint that
+    /// does not feel it.
     pub fn pull_columns(&self, axis: usize) -> &[Column] {
         self.pull[axis].get_or_init(|| {
             let mut columns = Vec::new();
@@ -371,7 +375,8 @@ impl<'a> Data<'a> {
         })
     }
 
-    /// A level of a joint's friction, tanh(γ·q̇), and its tangent; `make` makes them where they were not made lately.
+    /// A level of a joint's friction, tanh(γ·q̇), and its tangent; `make` makes them where they were not made
+    /// lately.
     pub fn level_columns(
         &self,
         joint: usize,
@@ -566,7 +571,8 @@ const MOST_NUMBERS: usize = 12 << 20;
 /// Samples of a regressor of which some joints are kept.
 const AT_ONCE: usize = 8192;
 
-/// The rows of some joints in the regressor along a recording, samples × joints × p; `groups`: of how many such it is made.
+/// The rows of some joints in the regressor along a recording, samples × joints × p; `groups`: of how many
+/// such it is made.
 fn regressor_of(body: &RigidArm, recording: &Recording, joints: &[usize], groups: usize) -> Vec<f64> {
     if groups == 1 {
         return body.regressor(&recording.q, &recording.v, &recording.a);

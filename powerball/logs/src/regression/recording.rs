@@ -1,5 +1,5 @@
-//! One piece of a log on an even grid: positions smoothed once, velocities and accelerations from them. Joints are
-//! those of the log, or the motors that it was turned to.
+//! One piece of a log on an even grid: positions smoothed once, velocities and accelerations from them.
+//! Joints are those of the log, or the motors that it was turned to.
 
 use crate::log::Log;
 use crate::signal::{Butterworth, difference, resample};

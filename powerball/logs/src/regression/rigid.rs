@@ -246,18 +246,20 @@ impl RigidArm {
         tool.map_or([0.0; 3], |tool| tool.xyz.each_ref().map(rational::to_f64))
     }
 
-    /// A point of a link's frame in the frame that the robot description gives the link, where the arm file has that
-    /// (`link_frame`), m.
+    /// A point of a link's frame in the frame that the robot description gives the link, where the arm file
+    /// has that (`link_frame`), m.
     #[must_use]
     pub fn in_link_frame(&self, link: usize, point: [f64; 3]) -> [f64; 3] {
         let frame = self.arm().joints.get(link).and_then(|joint| joint.link_frame.as_ref());
         frame.map_or(point, |frame| frame.see(point))
     }
 
-    /// Torques for unit forces there along the base axes: by axis and sample, n. `None` where they cannot be had.
+    /// Torques for unit forces there along the base axes: by axis and sample, n. `None` where they cannot be
+    /// had.
     #[must_use]
     pub fn force_columns(&self, q: &[f64]) -> Option<[Vec<f64>; 3]> {
-        // The static torque of a unit mass under unit gravity is that of a unit force; its first moments say where.
+        // The static torque of a unit mass under unit gravity is that of a unit force; its first moments say
+        // where.
         let first = self.last_link(ParameterKind::M);
         let point = self.force_point();
         let of = |axis: usize| {
@@ -360,7 +362,8 @@ mod tests {
     use crate::regression::newton_euler;
     use rand::{RngExt, SeedableRng};
 
-    /// A force on the tool is felt as the slopes of its work by the joints' positions: by the poses of the chain alone.
+    /// A force on the tool is felt as the slopes of its work by the joints' positions: by the poses of the
+    /// chain alone.
     #[test]
     fn a_force_on_the_tool_is_the_slope_of_its_work() {
         let text = include_str!("../../../../tests/arms/ur5e.toml");

@@ -82,7 +82,8 @@ impl JointRows {
         self.passed_rows(&passed)
     }
 
-    /// The rows of a signal that has passed the band already: by recording, one value for each kept sample of the band.
+    /// The rows of a signal that has passed the band already: by recording, one value for each kept sample of
+    /// the band.
     #[must_use]
     pub fn passed_rows(&self, passed: &[Vec<f64>]) -> Vec<f64> {
         self.kept.iter().zip(passed).flat_map(|(kept, passed)| kept.iter().map(|k| passed[*k])).collect()

@@ -3,7 +3,8 @@
 use super::{Column, Data};
 use std::ops::{Deref, DerefMut};
 
-/// A signal of all joints on the rows of some [`Data`]: by joint one value a row. As a slice it is a list of joints.
+/// A signal of all joints on the rows of some [`Data`]: by joint one value a row. As a slice it is a list of
+/// joints.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Signals(pub Vec<Vec<f64>>);
 

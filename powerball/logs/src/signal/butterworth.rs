@@ -244,8 +244,8 @@ mod tests {
         approx::assert_relative_eq!(rms, expected, max_relative = 0.01);
     }
 
-    /// Pieces worked on at the same time are the signal worked on from end to end: noise with a step and a large
-    /// constant, of any length, at bands from a tenth of the rate to a hundredth.
+    /// Pieces worked on at the same time are the signal worked on from end to end: noise with a step and a
+    /// large constant, of any length, at bands from a tenth of the rate to a hundredth.
     #[test]
     fn pieces_are_the_whole() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);

@@ -1,8 +1,8 @@
 //! Derivatives of evenly sampled signals by central differences.
 
-/// Weights of x(k + i) − x(k − i), i = 1, 2, 3, in a first derivative of sixth order (B. Fornberg, "Generation of finite
-/// difference formulas on arbitrarily spaced grids", Math. Comp. 51, 1988, table 1). Of a wave with seven samples a
-/// period it keeps 99.7 %, where the two neighbours alone keep 87 %.
+/// Weights of x(k + i) − x(k − i), i = 1, 2, 3, in a first derivative of sixth order (B. Fornberg,
+/// "Generation of finite difference formulas on arbitrarily spaced grids", Math. Comp. 51, 1988, table 1). Of
+/// a wave with seven samples a period it keeps 99.7 %, where the two neighbours alone keep 87 %.
 const FIRST: [f64; 3] = [3.0 / 4.0, -3.0 / 20.0, 1.0 / 60.0];
 /// Weights of x(k + i) − 2·x(k) + x(k − i) in a second derivative of sixth order (the same table).
 const SECOND: [f64; 3] = [3.0 / 2.0, -3.0 / 20.0, 1.0 / 90.0];
@@ -28,8 +28,8 @@ pub fn derivative(x: &[f64], dt: f64) -> Vec<f64> {
     d
 }
 
-/// d²x/dt² of samples `dt` seconds apart: central of sixth order, near the ends of second order, its neighbour's
-/// value at the ends.
+/// d²x/dt² of samples `dt` seconds apart: central of sixth order, near the ends of second order, its
+/// neighbour's value at the ends.
 #[must_use]
 pub fn second_derivative(x: &[f64], dt: f64) -> Vec<f64> {
     let n = x.len();

@@ -15,9 +15,9 @@ const ENDS: f64 = 0.3;
 
 /// A low-pass band with its decimation, the same on both sides of a regression.
 ///
-/// The narrower ones of [`BANDS`] are made of the samples of the one before at five times its cutoff: filtered
-/// again at that rate. It costs a fraction of a filter at full rate, and differs from one by 3 % of amplitude
-/// at most, around its end. What the wider band leaves of faster signals and folds into this one (a
+/// The narrower ones of [`BANDS`] are made of the samples of the one before at five times its cutoff:
+/// filtered again at that rate. It costs a fraction of a filter at full rate, and differs from one by 3 % of
+/// amplitude at most, around its end. What the wider band leaves of faster signals and folds into this one (a
 /// ten-thousandth) is the same on both sides, as is everything that is linear.
 #[derive(Clone, Debug)]
 pub struct Band {

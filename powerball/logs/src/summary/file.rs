@@ -193,12 +193,13 @@ impl Summary {
     }
 }
 
-// Factors as bits. A log's factors are rounded to multiples of a step of each column ([`Octaves::round`]), so they are
-// whole numbers of few digits; factors of logs that were joined are doubles. Both come back to the bit.
+// Factors as bits. A log's factors are rounded to multiples of a step of each column ([`Octaves::round`]), so
+// they are whole numbers of few digits; factors of logs that were joined are doubles. Both come back to the
+// bit.
 //
-// By joint: the step of each column, as its power of two in 16 bits; then by octave and row of the factor the bits
-// that each of its numbers takes, in 7 bits, and the numbers of all columns that are not zero throughout: in two's
-// complement, or as doubles where they take 64.
+// By joint: the step of each column, as its power of two in 16 bits; then by octave and row of the factor the
+// bits that each of its numbers takes, in 7 bits, and the numbers of all columns that are not zero
+// throughout: in two's complement, or as doubles where they take 64.
 
 /// Digits that a whole number may have, with its sign; others are doubles.
 const MOST: u32 = 52;
@@ -236,8 +237,8 @@ pub(super) fn write(joints: &[Octaves]) -> Vec<u8> {
     bits.bytes
 }
 
-/// The factors again, of `width` columns, by joint and octave of these numbers of rows; `None` where the bytes are
-/// others'.
+/// The factors again, of `width` columns, by joint and octave of these numbers of rows; `None` where the
+/// bytes are others'.
 pub(super) fn read(width: usize, rows: &[Vec<u64>], bytes: &[u8]) -> Option<Vec<Octaves>> {
     let mut bits = Reader { bytes, at: 0 };
     // This many joints would take more bits than there are.
@@ -287,7 +288,8 @@ fn power(step: i16) -> f64 {
     2f64.powi(step.into())
 }
 
-/// A number as a multiple of a step; `None` where it takes too many digits, or is one that only a double can be.
+/// A number as a multiple of a step; `None` where it takes too many digits, or is one that only a double can
+/// be.
 fn whole(x: f64, step: i16) -> Option<i64> {
     let multiple = x / power(step);
     let short = multiple.abs() < (1i64 << (MOST - 1)) as f64 && multiple * power(step) == x;

@@ -1,4 +1,5 @@
-//! Recordings of topics: a file, a file that is compressed as a whole, or the folder that rosbag2 makes of several.
+//! Recordings of topics: a file, a file that is compressed as a whole, or the folder that rosbag2 makes of
+//! several.
 
 use super::contents::{Finding, Format, LogError};
 use super::messages::Topics;
@@ -60,7 +61,8 @@ impl Parts {
                 let files = unlisted(path).map_err(|e| error(format!("cannot be read: {e}")))?;
                 if !files.is_empty() {
                     let what = format!(
-                        "has no {METADATA}, as the recording was interrupted: its {} files were read by their numbers",
+                        "has no {METADATA}, as the recording was interrupted: its {} files were read by \
+                        their numbers",
                         files.len()
                     );
                     notes.push(Finding::of_file(&shown, "rosbag2", what));

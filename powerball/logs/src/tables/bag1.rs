@@ -47,7 +47,10 @@ pub(super) fn read(path: &Path, topics: &mut Topics) -> io::Result<Vec<String>> 
         }
     }
     let message = first.map(|error| {
-        format!("{lost} of {chunks} chunks are damaged (the first: {error}): their messages are lost, the others were read")
+        format!(
+            "{lost} of {chunks} chunks are damaged (the first: {error}): their messages are lost, the \
+            others were read"
+        )
     });
     Ok(message.into_iter().collect())
 }

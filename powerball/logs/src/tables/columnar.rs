@@ -152,8 +152,8 @@ impl<'s, S: RowSink> Rows<'s, S> {
     }
 }
 
-/// A step of the library's, which panics at some of what is damaged within a page: that is an error like any other, and prints
-/// nothing.
+/// A step of the library's, which panics at some of what is damaged within a page: that is an error like any
+/// other, and prints nothing.
 #[cfg(feature = "parquet")]
 fn guarded<T, E: std::fmt::Display>(step: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
     use std::cell::Cell;

@@ -1,4 +1,5 @@
-//! Times that are written as dates: ISO 8601 and RFC 3339, `2024-05-01T12:00:00.005+02:00` or `2024-05-01 12:00:00.005`.
+//! Times that are written as dates: ISO 8601 and RFC 3339, `2024-05-01T12:00:00.005+02:00` or
+//! `2024-05-01 12:00:00.005`.
 
 use jiff::Timestamp;
 use jiff::civil::DateTime;

@@ -1,7 +1,8 @@
 //! HDF5: files of MATLAB's version 7.3 and of other programs, with one array for each quantity.
 //!
-//! The arrays of a group are a table, with those of the groups in it as `group.array`. Where a file has several groups that have
-//! none above them, as a file of recorded demonstrations has, each is a table with the group's path as its name.
+//! The arrays of a group are a table, with those of the groups in it as `group.array`. Where a file has
+//! several groups that have none above them, as a file of recorded demonstrations has, each is a table with
+//! the group's path as its name.
 
 use super::arrays::{Array, Values, table};
 use super::memory::Memory;

@@ -1,12 +1,13 @@
-//! Datasets of LeRobot, versions 2 and 3 (<https://huggingface.co/docs/lerobot/lerobot-dataset-v3>): `meta/info.json` and
-//! Parquet files below `data/`, whose columns are lists of numbers such as `observation.state`.
+//! Datasets of LeRobot, versions 2 and 3 (<https://huggingface.co/docs/lerobot/lerobot-dataset-v3>):
+//! `meta/info.json` and Parquet files below `data/`, whose columns are lists of numbers such as
+//! `observation.state`.
 //!
-//! A list of k numbers is k columns `name1` … `namek`; where the file lies in a dataset, the names that `meta/info.json`
-//! gives its numbers take the place of their count: `observation.state.shoulder_pan`, also where it calls them
-//! `shoulder_pan.pos` and so on.
+//! A list of k numbers is k columns `name1` … `namek`; where the file lies in a dataset, the names that
+//! `meta/info.json` gives its numbers take the place of their count: `observation.state.shoulder_pan`, also
+//! where it calls them `shoulder_pan.pos` and so on.
 //!
-//! The time of each episode begins at zero, one episode a file in version 2 and many in version 3: episodes are put behind
-//! each other, some seconds apart, so that they are pieces of one log.
+//! The time of each episode begins at zero, one episode a file in version 2 and many in version 3: episodes
+//! are put behind each other, some seconds apart, so that they are pieces of one log.
 
 use super::columnar;
 use super::contents::{Finding, Format, INFO, LogError, dataset};
@@ -60,8 +61,8 @@ pub(crate) fn read(
     }
     let fps = info["fps"].as_f64().map_or(String::new(), |fps| format!(" at {fps} Hz"));
     let what = format!(
-        "{episodes} episodes, each a piece of the log; their time stamps are those of even frames{fps} unless the recorder \
-         gave its own"
+        "{episodes} episodes, each a piece of the log; their time stamps are those of even frames{fps} \
+         unless the recorder gave its own"
     );
     notes.push(Finding::of_file(file, "LeRobot", what));
     Ok(())
@@ -101,7 +102,8 @@ pub(super) struct Dataset {
 }
 
 impl Dataset {
-    /// The names of the numbers in a file's columns, each with how many a list of it has, and how they follow each other.
+    /// The names of the numbers in a file's columns, each with how many a list of it has, and how they follow
+    /// each other.
     pub(super) fn of<'n>(
         file: &Path,
         columns: impl Iterator<Item = (&'n str, Option<usize>)> + Clone,

@@ -1,5 +1,6 @@
-//! MATLAB's files of version 5 to 7 (`save`, `save -v7`, `scipy.io.savemat`), as "MAT-File Format" of MathWorks describes
-//! them (version 7.3 is HDF5): arrays of numbers, of letters, cells of letters, and the fields of a struct of one element.
+//! MATLAB's files of version 5 to 7 (`save`, `save -v7`, `scipy.io.savemat`), as "MAT-File Format" of
+//! MathWorks describes them (version 7.3 is HDF5): arrays of numbers, of letters, cells of letters, and the
+//! fields of a struct of one element.
 
 use super::arrays::{Array, Values, one};
 use super::memory::Memory;

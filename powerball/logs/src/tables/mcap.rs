@@ -146,7 +146,8 @@ struct Records<'t> {
     behind_lost: bool,
 }
 
-/// A chunk that could not be read: its number in the file, from 1, how many messages its index names, and why.
+/// A chunk that could not be read: its number in the file, from 1, how many messages its index names, and
+/// why.
 struct Lost {
     chunk: usize,
     messages: usize,
@@ -281,7 +282,8 @@ impl<'t> Records<'t> {
     fn torn(&self, error: &McapError) -> io::Result<Option<String>> {
         Ok(Some(match error {
             McapError::UnexpectedEof | McapError::RecordTooLarge { .. } | McapError::ChunkTooLarge(_) => {
-                "the file ends before its end is marked: the recording was interrupted; it was read up to there"
+                "the file ends before its end is marked: the recording was interrupted; it was read up to \
+                there"
                     .into()
             }
             _ if self.messages == 0 => return Err(io::Error::other(error.to_string())),
@@ -399,7 +401,8 @@ impl<'t> Records<'t> {
             let messages: usize = self.lost.iter().map(|lost| lost.messages).sum();
             let how_many = if messages > 0 { format!("{messages} messages") } else { "its messages".into() };
             format!(
-                "{} of {} chunks are damaged (the first: chunk {}, {}): {how_many} are lost, the others were read",
+                "{} of {} chunks are damaged (the first: chunk {}, {}): {how_many} are lost, the others were \
+                read",
                 self.lost.len(),
                 self.chunks,
                 first.chunk,

@@ -1,4 +1,5 @@
-//! Recordings as MCAP, which rosbag2 plays and Foxglove and rerun open: joint states in ROS's message, all else as JSON.
+//! Recordings as MCAP, which rosbag2 plays and Foxglove and rerun open: joint states in ROS's message, all
+//! else as JSON.
 
 use super::cdr::CdrWriter;
 use ::mcap::records::MessageHeader;
@@ -21,7 +22,8 @@ const JOINT_STATE: &str = "std_msgs/Header header\nstring[] name\nfloat64[] posi
 #[derive(Clone, Copy, Debug)]
 pub struct Channel(u16);
 
-/// Writes a file, message by message, in chunks compressed with Zstandard, with checksums, an index and statistics.
+/// Writes a file, message by message, in chunks compressed with Zstandard, with checksums, an index and
+/// statistics.
 pub struct McapWriter<W: Write> {
     inner: Writer<NoSeek<W>>,
     messages: u32,

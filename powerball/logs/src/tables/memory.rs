@@ -14,8 +14,8 @@ const MOST_COLUMNS: usize = 10_000;
 /// Bytes of a number.
 const NUMBER: u64 = 8;
 
-/// Sets how many bytes of memory one log may take from now on in this process. Without it the limit is half of what is free when
-/// a log is read.
+/// Sets how many bytes of memory one log may take from now on in this process. Without it the limit is half
+/// of what is free when a log is read.
 pub fn allow_memory(bytes: u64) {
     ALLOWED.store(bytes, Ordering::Relaxed);
 }

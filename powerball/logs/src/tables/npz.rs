@@ -1,4 +1,5 @@
-//! Arrays of NumPy: archives of them (`.npz`, `numpy.savez` and `savez_compressed`, a ZIP of `.npy` files) and a `.npy` alone.
+//! Arrays of NumPy: archives of them (`.npz`, `numpy.savez` and `savez_compressed`, a ZIP of `.npy` files)
+//! and a `.npy` alone.
 
 use super::arrays::{Array, Values, one};
 use super::memory::Memory;

@@ -106,8 +106,8 @@ fn shown(error: &Error, address: &str) -> String {
     };
     let advice = match address.starts_with("s3://") && !known.into_iter().any(set) {
         true => {
-            "; there are no credentials: set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or AWS_SKIP_SIGNATURE=true for a \
-             public bucket"
+            "; there are no credentials: set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or \
+             AWS_SKIP_SIGNATURE=true for a public bucket"
         }
         false => "",
     };

@@ -66,7 +66,8 @@ impl Bag {
         match self.messages(topics, &mut messages) {
             Ok(()) => Ok(Vec::new()),
             Err(e) if messages > 0 => Ok(vec![format!(
-                "it is damaged after message {messages} ({e}): it was read up to there; `sqlite3 FILE .recover` may find more"
+                "it is damaged after message {messages} ({e}): it was read up to there; `sqlite3 FILE \
+                .recover` may find more"
             )]),
             Err(e) => Err(failed(e)),
         }
@@ -98,7 +99,8 @@ impl Bag {
         // A camera's pictures stay on the disk.
         let read = topics.ids_read().map(|id| id.to_string()).collect::<Vec<_>>().join(",");
         let text = format!(
-            "SELECT topic_id, timestamp, CASE WHEN topic_id IN ({read}) THEN data END FROM messages ORDER BY id"
+            "SELECT topic_id, timestamp, CASE WHEN topic_id IN ({read}) THEN data END FROM messages ORDER BY \
+            id"
         );
         let mut statement = self.database.prepare(&text)?;
         let mut rows = statement.query([])?;

@@ -1,5 +1,5 @@
-//! Logs as CSV with a header line, between whose names stand commas, semicolons, tabs or blanks. Where no commas stand
-//! there, numbers may have decimal commas. Times may be dates.
+//! Logs as CSV with a header line, between whose names stand commas, semicolons, tabs or blanks. Where no
+//! commas stand there, numbers may have decimal commas. Times may be dates.
 
 use super::memory::{Memory, few_columns};
 use super::table::RowSink;
@@ -37,7 +37,9 @@ pub(super) fn no_text(head: &[u8]) -> Option<String> {
     }
     let is_control = |byte: &u8| matches!(byte, 0..=8 | 14..=31 | 127);
     head.iter().any(is_control).then(|| {
-        "is no log: it holds bytes that are no text, and begins like no Parquet, MCAP, bag, npz, mat or HDF5".to_string()
+        "is no log: it holds bytes that are no text, and begins like no Parquet, MCAP, bag, npz, mat or \
+        HDF5"
+            .to_string()
     })
 }
 
@@ -52,8 +54,8 @@ pub fn number(text: &str) -> Option<f64> {
     text.parse().ok().or_else(date)
 }
 
-/// Hands the lines of a CSV file over, which stays on the disk; whether the last one is torn. Unreadable lines are named in
-/// `findings`.
+/// Hands the lines of a CSV file over, which stays on the disk; whether the last one is torn. Unreadable
+/// lines are named in `findings`.
 pub(crate) fn read(
     mut input: impl Read,
     file: &str,
@@ -110,8 +112,8 @@ pub(crate) fn read(
             .map_err(|reason| LogError(vec![error(Some(line), "memory", reason)]))?;
         if delimiter == b',' && names.len() > 1 && record.len() == 2 * names.len() {
             let message = format!(
-                "has {} fields where the header names {} columns: decimal commas between commas; separate the fields by \
-                 semicolons",
+                "has {} fields where the header names {} columns: decimal commas between commas; separate \
+                 the fields by semicolons",
                 record.len(),
                 names.len()
             );

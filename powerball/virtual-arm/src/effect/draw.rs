@@ -19,7 +19,8 @@ pub struct Places {
     pub loaded: Vec<usize>,
     /// Links with a declared plane of symmetry, and how far aside a centre of mass may lie there, m.
     pub symmetric: Vec<(usize, f64)>,
-    /// Joints of which the second feels friction of the first, and its share where both have the same friction.
+    /// Joints of which the second feels friction of the first, and its share where both have the same
+    /// friction.
     pub coupled: Vec<([usize; 2], f64)>,
     /// Stiffness of each joint's gear, N·m/rad or N/m.
     pub stiffness: Vec<Range<f64>>,

@@ -284,7 +284,8 @@ impl PlantEffect {
             }
             PlantEffect::Stribeck { level, velocity, .. } => {
                 format!(
-                    "{level:.2} N·m more friction at the smallest velocities, gone beyond about {velocity:.3} rad/s"
+                    "{level:.2} N·m more friction at the smallest velocities, gone beyond about \
+                    {velocity:.3} rad/s"
                 )
             }
             PlantEffect::VelocityNonlinearity { torque, exponent, .. } => {

@@ -68,7 +68,7 @@ struct Noise {
 }
 
 impl Clone for Noise {
-    /// The same noise from here on: the generator has no `Clone`, so its state is copied.
+    /// A generator of the same noise from here on: the generator has no `Clone`, so its state is copied.
     fn clone(&self) -> Self {
         Noise { rng: ChaCha8Rng::deserialize_state(&self.rng.serialize_state()), slow: self.slow.clone() }
     }

@@ -19,8 +19,8 @@ pub struct HandSample {
 /// The actions of a hand so far.
 pub type HandLog = Arc<Mutex<Vec<HandSample>>>;
 
-/// A hand that pulls every joint along a path and lets go at its end. It takes hold when all joints are free: brakes open
-/// and drives in their current mode.
+/// A hand that pulls every joint along a path and lets go at its end. It takes hold when all joints are free:
+/// brakes open and drives in their current mode.
 #[derive(Clone, Debug)]
 pub struct Hand {
     path: Motion,

@@ -179,8 +179,8 @@ impl Reference {
 }
 
 /// Between set-points the drive follows the cubic B-spline of the last four: linear interpolation averaged
-/// twice over one period, as a drive's jerk filter does. Acceleration is continuous, and a constant velocity is
-/// followed exactly, two periods late. `phase` is the share of the period that has passed.
+/// twice over one period, as a drive's jerk filter does. Acceleration is continuous, and a constant velocity
+/// is followed exactly, two periods late. `phase` is the share of the period that has passed.
 pub(super) fn spline(points: [f64; 4], phase: f64, period: f64) -> Reference {
     let x = phase.clamp(0.0, 1.0);
     let (y, x2, x3) = (1.0 - x, x * x, x * x * x);

@@ -20,8 +20,8 @@ pub struct Arm {
     pub watch: Watch,
     /// Transmit PDOs by number: what the drives send each SYNC.
     pub transmit: BTreeMap<String, Vec<Mapped>>,
-    /// Modes by name: `profile_position`, `velocity`, `interpolated_position`, `current`; those that the drive has not
-    /// are left out.
+    /// Modes by name: `profile_position`, `velocity`, `interpolated_position`, `current`; those that the
+    /// drive has not are left out.
     pub mode: BTreeMap<String, ModeTable>,
     /// Scale of mode VL, where it is among the modes.
     pub velocity_scale: Option<VelocityScaleTable>,
@@ -102,8 +102,8 @@ pub struct JointTable {
     /// Greatest velocity error, rad/s.
     #[serde(default = "velocity_error")]
     pub velocity_error: f64,
-    /// Counts in a degree; negative where the drive counts against the joint. Where it is left out it is taken from
-    /// 0x608F, 0x6091 and 0x6092 of the drive's file.
+    /// Counts in a degree; negative where the drive counts against the joint. Where it is left out it is
+    /// taken from 0x608F, 0x6091 and 0x6092 of the drive's file.
     pub counts_per_degree: Option<f64>,
     /// 0x1018:1; where it is left out, VendorNumber of the drive's file.
     pub vendor: Option<u32>,

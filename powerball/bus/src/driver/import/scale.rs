@@ -1,8 +1,8 @@
 //! Counts of a joint's position, from the TOML and from the scales in the drive's file.
 //!
-//! CiA 402-2 (IEC 61800-7-201): position = internal position · feed constant / (encoder resolution · gear ratio).
-//! A turn of the shaft is resolution · gear ratio internal increments, and so feed constant counts. A drive without
-//! a feed constant counts the increments themselves.
+//! CiA 402-2 (IEC 61800-7-201): position = internal position · feed constant / (encoder resolution · gear
+//! ratio). A turn of the shaft is resolution · gear ratio internal increments, and so feed constant counts. A
+//! drive without a feed constant counts the increments themselves.
 
 use super::{Dcf, ImportError, JointTable};
 use crate::canopen::Object;
@@ -88,8 +88,8 @@ pub(super) fn counts_per_degree(
             turn.counts, turn.source
         ))),
         (None, None) => Err(ImportError::Toml(format!(
-            "node {node}: counts_per_degree is missing in [[joint]], and the drive's file has no values of 0x608F, 0x6091 \
-             or 0x6092 to take it from"
+            "node {node}: counts_per_degree is missing in [[joint]], and the drive's file has no values of \
+             0x608F, 0x6091 or 0x6092 to take it from"
         ))),
     }
 }
@@ -98,7 +98,8 @@ pub(super) fn counts_per_degree(
 mod tests {
     use super::*;
 
-    const JOINT: &str = "node = 3\nposition = [-1.0, 1.0]\nvelocity = 1.0\nacceleration = 1.0\nrated_torque = 1.0\n\
+    const JOINT: &str = "node = 3\nposition = [-1.0, 1.0]\nvelocity = 1.0\nacceleration = \
+        1.0\nrated_torque = 1.0\n\
         current = 1.0\n";
 
     fn scaled(objects: &[(&str, &str)], given: &str) -> Result<(f64, Option<String>), ImportError> {

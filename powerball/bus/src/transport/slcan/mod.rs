@@ -1,4 +1,5 @@
-//! Serial adapters that speak slcan (Lawicel's lines of text), on a serial port of any system or a pseudo terminal.
+//! Serial adapters that speak slcan (Lawicel's lines of text), on a serial port of any system or a pseudo
+//! terminal.
 //!
 //! The status flags of the adapter are read four times a second, if it answers at all: some do not, and a
 //! program at the other end of a pseudo terminal need not. Source: Lawicel's CAN232 and CANUSB manuals, and
@@ -56,11 +57,12 @@ pub struct Slcan {
 }
 
 impl Slcan {
-    /// Opens a serial device, sets the bit rate of the bus in bit/s, and opens the adapter's channel. The speed of
-    /// the serial line itself stays as the system has it.
+    /// Opens a serial device, sets the bit rate of the bus in bit/s, and opens the adapter's channel. The
+    /// speed of the serial line itself stays as the system has it.
     ///
     /// # Errors
-    /// Where slcan has no command for the bit rate, the device cannot be opened or written, or the adapter refuses.
+    /// Where slcan has no command for the bit rate, the device cannot be opened or written, or the adapter
+    /// refuses.
     pub fn open(device: &Path, bitrate: u32) -> Result<Self, BusError> {
         let name = device.display().to_string();
         let digit = speed(bitrate).map_err(|why| BusError::Io(format!("slcan:{name}: {why}")))?;
@@ -117,8 +119,8 @@ impl Slcan {
 
     /// Ends what an earlier program began; false where the adapter answers nothing.
     fn end_session(&mut self) -> Result<bool, BusError> {
-        // The first two end half a command. A channel that is closed may refuse to be closed. The version comes last: what
-        // is heard before it answers none of the commands that follow.
+        // The first two end half a command. A channel that is closed may refuse to be closed. The version
+        // comes last: what is heard before it answers none of the commands that follow.
         self.out.extend(b"\r\rC\rV\r");
         let (end, mut answers) = (self.now() + ANSWER, false);
         while let Some(line) = self.hear(end)? {
@@ -251,7 +253,8 @@ impl Slcan {
         } else if refused && !flags.not_sent() && self.state != State::Off {
             self.tell(Event::NotSent);
         }
-        // Flags are latched and cleared: they say that a controller went off the bus, never that it came back.
+        // Flags are latched and cleared: they say that a controller went off the bus, never that it came
+        // back.
         if self.state != State::Off {
             self.enter(if flags.passive() { State::Passive } else { State::Active });
         }

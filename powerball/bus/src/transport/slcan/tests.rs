@@ -14,7 +14,7 @@ struct Adapter {
     refuses: Vec<&'static str>,
     /// The answer to `F`, which clears it; `None` where it has no such command.
     flags: Option<u8>,
-    /// It answers nothing at all.
+    /// The adapter answers nothing at all.
     silent: bool,
     heard: Vec<String>,
 }

@@ -23,8 +23,8 @@ use tracing_subscriber::util::SubscriberInitExt;
 /// Which events are seen, and where.
 #[derive(Args, Clone, Debug)]
 pub(super) struct Events {
-    /// Add events to this file, a JSON object each (time, level, message), or send them to `journald`. RUST_LOG says
-    /// which: info, debug (each drive's state too), warn.
+    /// Add events to this file, a JSON object each (time, level, message), or send them to `journald`.
+    /// RUST_LOG says which: info, debug (each drive's state too), warn.
     #[arg(long, global = true, value_name = "FILE|journald")]
     events: Option<PathBuf>,
 }

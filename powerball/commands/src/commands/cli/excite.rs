@@ -72,8 +72,8 @@ pub(super) fn floor(text: &str) -> Result<FloorAt, String> {
     one file for each, path_1.csv, path_2.csv and so on, which determine the parameters together."
 )]
 pub(crate) struct Excite {
-    /// The arm file; every joint needs `position`, `velocity` and `acceleration` in it, or `torque` in place of
-    /// `acceleration` where the masses are known (--values).
+    /// The arm file; every joint needs `position`, `velocity` and `acceleration` in it, or `torque` in place
+    /// of `acceleration` where the masses are known (--values).
     #[arg(long)]
     arm: PathBuf,
     /// The parameter set whose regressor is to be well conditioned.
@@ -287,7 +287,8 @@ fn in_words(result: &Excited, files: &[PathBuf]) -> String {
     for trajectory in &result.trajectories {
         let _ = writeln!(
             out,
-            "\njoint   position [rad]     of limit        velocity  of limit   acceleration  of limit   torque  of limit"
+            "\njoint   position [rad]     of limit        velocity  of limit   acceleration  of limit   \
+            torque  of limit"
         );
         let torque = trajectory.tightest.torque.as_ref();
         for (i, ([low, high, velocity, acceleration], limit)) in
@@ -297,7 +298,8 @@ fn in_words(result: &Excited, files: &[PathBuf]) -> String {
             let torque = torque.map_or("-".to_string(), |t| format!("{:.1}", t[i]));
             let _ = writeln!(
                 out,
-                "{:>5}  {low:>6.2} … {high:<6.2}  {lowest:>6.2} … {highest:<6.2}  {velocity:>6.2}    {:>6.2}      {acceleration:>9.2}    {:>6.2}   {torque:>6}    {:>6}",
+                "{:>5}  {low:>6.2} … {high:<6.2}  {lowest:>6.2} … {highest:<6.2}  {velocity:>6.2}    \
+                {:>6.2}      {acceleration:>9.2}    {:>6.2}   {torque:>6}    {:>6}",
                 JointNumber::from_index(i).number(),
                 limit.velocity,
                 limit.acceleration,

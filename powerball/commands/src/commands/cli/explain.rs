@@ -116,7 +116,9 @@ impl Explain {
         let experiment = false;
         if self.model.is_some() || experiment {
             return Err(Failure::Unusable(
-                "--model and --experiment take logs with torques; these are of position servos (goal1 … and no torque)".into(),
+                "--model and --experiment take logs with torques; these are of position servos (goal1 … and \
+                no torque)"
+                    .into(),
             ));
         }
         output::make_folder(&self.inputs.out)?;
@@ -173,8 +175,8 @@ const RIVALS: usize = 3;
 /// Logs unlike the others that have a line.
 const LOGS: usize = 2;
 
-/// The answer in at most [`LINES`] lines for an arm of seven joints. `arm` and `out` are the arm file and the folder of the
-/// results, for the next command.
+/// The answer in at most [`LINES`] lines for an arm of seven joints. `arm` and `out` are the arm file and the
+/// folder of the results, for the next command.
 pub(super) fn summary(explained: &Explained, arm: &Path, out: &Path) -> String {
     let mut head = output::first_lines(&explained.unusable, explained.conventions.as_ref(), false);
     head.push(table(explained));
@@ -242,7 +244,8 @@ pub(super) fn everything(explained: &Explained, arm: &Path, out: &Path) -> Strin
     text
 }
 
-/// What the logs leave open and what an experiment decided, in words; empty where there is nothing of the kind.
+/// What the logs leave open and what an experiment decided, in words; empty where there is nothing of the
+/// kind.
 pub(super) fn open_in_words(explained: &Explained) -> String {
     let mut text = decided(explained).map_or_else(String::new, |line| line + "\n");
     if let Some(next) = &explained.next_experiment {
@@ -375,8 +378,8 @@ fn advice(verdict: &Verdict) -> String {
 
 fn evidence(effect: &NamedEffect, sliding: &[bool]) -> String {
     let mut text = format!(
-        "{} on joint {}: {}\n  p = {:.1e}, evidence {:.2} times that of the next name, {:.0} % of the excess over noise left, \
-         right in {:.0} of 100\n",
+        "{} on joint {}: {}\n  p = {:.1e}, evidence {:.2} times that of the next name, {:.0} % of the excess \
+         over noise left, right in {:.0} of 100\n",
         effect.effect,
         list(&effect.joints),
         effect.size(sliding),

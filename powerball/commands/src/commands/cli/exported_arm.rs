@@ -98,8 +98,8 @@ impl ArmResult {
     }
 }
 
-/// The file with the model of a result, its text and its JSON (for explained.json those of model.json next to it), and the
-/// arm file that the result names.
+/// The file with the model of a result, its text and its JSON (for explained.json those of model.json next to
+/// it), and the arm file that the result names.
 fn model_of(result: &Path) -> Result<(PathBuf, String, Value, Option<PathBuf>), Failure> {
     let read = |path: &Path| -> Result<(String, Value), Failure> {
         let wrong = |what: String| Failure::Unusable(format!("{}: {what}", path.display()));

@@ -28,12 +28,12 @@ pub(crate) struct Generate {
     /// The file to write.
     #[arg(short, long, value_name = "FILE.rs", required_unless_present = "yaml")]
     output: Option<PathBuf>,
-    /// Write friction, gravity and inertial values as a parameter file of ROS 2, for a controller of ros2_control that
-    /// computes torques itself.
+    /// Write friction, gravity and inertial values as a parameter file of ROS 2, for a controller of
+    /// ros2_control that computes torques itself.
     #[arg(long, value_name = "FILE.yaml")]
     yaml: Option<PathBuf>,
-    /// Write a C header too, for callers in C and C++: the file in Rust then has its functions as extern "C". Their
-    /// names begin with the header's: my_arm.h gives my_arm_torque.
+    /// Write a C header too, for callers in C and C++: the file in Rust then has its functions as extern "C".
+    /// Their names begin with the header's: my_arm.h gives my_arm_torque.
     #[arg(long, value_name = "FILE.h", requires = "output")]
     c_header: Option<PathBuf>,
     /// The scalar of the controller.

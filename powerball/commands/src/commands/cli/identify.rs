@@ -29,8 +29,9 @@ use std::path::{Path, PathBuf};
 #[command(
     after_help = "Examples:\n  powerball identify --arm arm.toml --log a.csv b.csv --validate c.csv --out \
         result\n  powerball identify --arm arm.toml --log a.summary b.summary --out result\n  \
-    powerball identify --arm arm.toml --log upright.csv --mounting 90,0 --log on_its_side.csv --out result\n  \
-    powerball identify --arm servos.toml --log goals_and_positions.csv --validate other.csv --out result"
+    powerball identify --arm arm.toml --log upright.csv --mounting 90,0 --log on_its_side.csv --out \
+    result\n  powerball identify --arm servos.toml --log goals_and_positions.csv --validate other.csv --out \
+    result"
 )]
 pub(crate) struct Identify {
     /// The arm file (TOML).
@@ -51,8 +52,8 @@ pub(crate) struct Identify {
     /// How rows are counted.
     #[arg(long, value_enum, default_value_t)]
     estimator: EstimatorName,
-    /// The URDF or MuJoCo model that the arm file was imported from: a copy of it with the identified values, friction
-    /// and effects is written into the folder of the results, under its name.
+    /// The URDF or MuJoCo model that the arm file was imported from: a copy of it with the identified values,
+    /// friction and effects is written into the folder of the results, under its name.
     #[arg(long, value_name = "ORIGINAL")]
     export: Option<PathBuf>,
     #[command(flatten)]
@@ -150,7 +151,9 @@ impl Identify {
     ) -> Result<(), Failure> {
         if self.model.is_some() || self.export.is_some() {
             return Err(Failure::Unusable(
-                "--model and --export take logs with torques; these are of position servos (goal1 … and no torque)".into(),
+                "--model and --export take logs with torques; these are of position servos (goal1 … and no \
+                torque)"
+                    .into(),
             ));
         }
         output::make_folder(&self.out)?;
@@ -262,7 +265,8 @@ impl Original {
         Ok(Original { source, copy })
     }
 
-    /// Writes the copy with the values, friction and effects of `identified`, a result as JSON that stands in `file`.
+    /// Writes the copy with the values, friction and effects of `identified`, a result as JSON that stands in
+    /// `file`.
     pub(super) fn write(&self, arm: &Arm, identified: &str, file: &Path) -> Result<(), Failure> {
         let file = file.display().to_string();
         let known = Known::read(arm, (identified, &file), Some((identified, &file)));

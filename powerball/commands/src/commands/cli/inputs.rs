@@ -21,8 +21,8 @@ pub(crate) struct Inputs {
     /// The arm file (TOML).
     #[arg(long, value_name = "ARM.toml")]
     pub arm: PathBuf,
-    /// Logs to fit (CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5: t, q1…, tau1… or i1…); several, in the order in which
-    /// they were recorded.
+    /// Logs to fit (CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5: t, q1…, tau1… or i1…); several, in
+    /// the order in which they were recorded.
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     pub log: Vec<PathBuf>,
     #[command(flatten)]
@@ -145,8 +145,8 @@ impl MountedLogs {
 /// As they stand on the command line.
 #[derive(Args, Debug)]
 struct Options {
-    /// Logs to fit (CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5: t, q1…, tau1… or i1…), or their summaries from
-    /// `powerball summarize`.
+    /// Logs to fit (CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5: t, q1…, tau1… or i1…), or their
+    /// summaries from `powerball summarize`.
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     log: Vec<PathBuf>,
     /// Logs on which the fit is judged, on another path.

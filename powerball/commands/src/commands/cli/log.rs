@@ -16,9 +16,9 @@ use std::path::{Path, PathBuf};
 /// With an arm also the log that `identify` would read. Exit code 1 where a file is not a log of that arm.
 #[derive(Args, Debug)]
 #[command(
-    after_help = "Examples:\n  powerball log recording.mcap --out looked\n  powerball log bag_0.db3 --arm arm.toml --map \
-        'joints = [\"shoulder_pan_joint\", \"shoulder_lift_joint\"]'\n  powerball log run.csv --arm arm.toml --model \
-        result/identified.json --to mcap -o run.mcap"
+    after_help = "Examples:\n  powerball log recording.mcap --out looked\n  powerball log bag_0.db3 --arm \
+        arm.toml --map 'joints = [\"shoulder_pan_joint\", \"shoulder_lift_joint\"]'\n  powerball log run.csv \
+        --arm arm.toml --model result/identified.json --to mcap -o run.mcap"
 )]
 pub(crate) struct LogCommand {
     /// The files.

@@ -69,7 +69,8 @@ enum Command {
     Explain(explain::Explain),
     /// Write a model with its effects as one Rust file for a controller.
     Generate(generate::Generate),
-    /// Write what was found in another program's form: a load for a robot's controller, the arm for a simulator.
+    /// Write what was found in another program's form: a load for a robot's controller, the arm for a
+    /// simulator.
     Export(export::Export),
     #[cfg(feature = "cli")]
     /// Print what completes this program's words in a shell.

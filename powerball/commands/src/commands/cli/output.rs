@@ -11,7 +11,8 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// The target of events whose words stand on standard error anyhow: how far a computation has come, and how it ended.
+/// The target of events whose words stand on standard error anyhow: how far a computation has come, and how
+/// it ended.
 pub(super) const SHOWN: &str = "powerball::shown";
 
 /// What a command is doing, on standard error: as it happens where a person looks at it, and as a table of
@@ -100,7 +101,8 @@ fn times(phases: &[Phase]) -> String {
     text
 }
 
-/// Makes a folder for results, where it is missing; refused where files of their names in it are none of them.
+/// Makes a folder for results, where it is missing; refused where files of their names in it are none of
+/// them.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
     replace::check_folder(folder)?;
     files::make_folder(folder).map_err(Failure::Unusable)

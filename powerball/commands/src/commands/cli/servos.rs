@@ -15,9 +15,9 @@ use std::path::{Path, PathBuf};
 /// What is known of the bodies of an arm on servos.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(super) struct Masses {
-    /// Masses of the arm, where its joints are position servos (logs with goal1 … and without torque): {"m1": 0.5, "mx1": …},
-    /// every inertial parameter of each link. Without it they are those of ARM.values.json, which `dyngen import` writes next
-    /// to the arm file; else torques are shares of the torque at full duty.
+    /// Masses of the arm, where its joints are position servos (logs with goal1 … and without torque): {"m1":
+    /// 0.5, "mx1": …}, every inertial parameter of each link. Without it they are those of ARM.values.json,
+    /// which `dyngen import` writes next to the arm file; else torques are shares of the torque at full duty.
     #[arg(long, value_name = "FILE.json")]
     values: Option<PathBuf>,
 }

@@ -15,8 +15,8 @@ use std::sync::Arc;
 /// Judge an identified model on logs that it has not seen (Fig. 8): errors with intervals, against the noise
 /// floor.
 ///
-/// Writes verified.json and report.html. Exit code 1 where a joint's error is beyond the tolerance, 3 where the logs should not
-/// be used.
+/// Writes verified.json and report.html. Exit code 1 where a joint's error is beyond the tolerance, 3 where
+/// the logs should not be used.
 #[derive(Args, Debug)]
 #[command(
     after_help = "Example:\n  powerball verify --arm arm.toml --model result/identified.json --log other.csv \
@@ -64,7 +64,8 @@ impl Verify {
             output::first_lines(&verified.unusable, None, false).iter().for_each(|line| output::print(line));
             for (j, band) in verified.joints.iter().zip(&verified.joint_bands) {
                 output::print(&format!(
-                    "joint {}: {:.4} N·m ({:.4} to {:.4}), {:.1} % of the torque, noise alone {:.4} N·m, {band} Hz",
+                    "joint {}: {:.4} N·m ({:.4} to {:.4}), {:.1} % of the torque, noise alone {:.4} N·m, \
+                    {band} Hz",
                     j.joint,
                     j.rms,
                     j.interval[0],

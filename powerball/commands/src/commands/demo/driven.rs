@@ -39,8 +39,8 @@ pub struct Driven {
     pub path: DrivenPath<6>,
 }
 
-/// The base model as a controller takes it: the parameters that a real arm can have. Where the logs have an effect that the
-/// model lacks, the best fit itself need not be an arm's.
+/// The base model as a controller takes it: the parameters that a real arm can have. Where the logs have an
+/// effect that the model lacks, the best fit itself need not be an arm's.
 ///
 /// # Errors
 /// Where the arm file cannot be derived.
@@ -68,8 +68,9 @@ pub(super) fn base_model(arm: &Arm, identified: &Identified) -> Result<TorqueMod
     })
 }
 
-/// Moves the arm of a session, in current mode with computed torque, along a path that no model has seen: with the model of
-/// `base` and with that of `explained`, both files of models. The path is written into `folder`.
+/// Moves the arm of a session, in current mode with computed torque, along a path that no model has seen:
+/// with the model of `base` and with that of `explained`, both files of models. The path is written into
+/// `folder`.
 ///
 /// # Errors
 /// Where a model does not fit the arm, no path is within the joints' torques, or the arm stopped.

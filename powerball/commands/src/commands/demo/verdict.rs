@@ -131,7 +131,10 @@ pub fn page(demo: &Demo) -> Page {
     match &demo.driven {
         Ok(driven) => {
             page.heading("The arm moved with what was found");
-            page.lead("The same virtual arm along a path that no model has seen, with computed torque in current mode: once with the base model, once with the explained one.");
+            page.lead(
+                "The same virtual arm along a path that no model has seen, with computed torque in \
+                current mode: once with the base model, once with the explained one.",
+            );
             followed::add_to_page(&mut page, &driven.followed, &driven.path, &driven.tracks);
         }
         Err(why) => page.note(Tone::Plain, &format!("The arm was not moved with the models: {why}")),

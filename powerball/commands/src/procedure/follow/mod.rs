@@ -1,5 +1,5 @@
-//! A path followed with a torque model: as torque offset of drives that interpolate positions, or by a control law in
-//! current mode.
+//! A path followed with a torque model: as torque offset of drives that interpolate positions, or by a
+//! control law in current mode.
 
 mod path;
 mod tolerance;
@@ -52,7 +52,8 @@ impl<const N: usize> Law<N> {
         }
     }
 
-    /// K and D of the closed loop about a pose with this inertia, N·m/rad and N·m·s/rad; none where the drives close it.
+    /// K and D of the closed loop about a pose with this inertia, N·m/rad and N·m·s/rad; none where the
+    /// drives close it.
     pub fn stiffness_and_damping(&self, inertia: &SMatrix<f64, N, N>) -> Option<[SMatrix<f64, N, N>; 2]> {
         match self {
             Law::Feedforward => None,
@@ -85,8 +86,8 @@ impl<const N: usize> Law<N> {
             let pole = largest_pole(&inertia, &stiffness, &damping, period);
             if !pole.is_stable() {
                 return Err(format!(
-                    "these gains are not stable at {:.0} Hz: the largest pole of the sampled loop is {:.4} at ({}) rad, and \
-                        must be below 1. Take a lower bandwidth, or damping above 0",
+                    "these gains are not stable at {:.0} Hz: the largest pole of the sampled loop is {:.4} \
+                        at ({}) rad, and must be below 1. Take a lower bandwidth, or damping above 0",
                     1.0 / period,
                     pole.0,
                     listed(&q)
@@ -116,7 +117,8 @@ pub struct Run<'a, M, const N: usize> {
     pub best: &'a Parts<N>,
     /// How far, rad, a push may take a joint off the path next to that.
     pub give: f64,
-    /// The best model, for the driver's guard in current mode; without one the guard looks at all but torques.
+    /// The best model, for the driver's guard in current mode; without one the guard looks at all but
+    /// torques.
     pub guard: Option<TorqueGuard<N>>,
     /// How it is followed.
     pub law: Law<N>,
@@ -148,8 +150,9 @@ impl<M: ArmModel<f64, N>, const N: usize> ArmModel<f64, N> for InertiaAlone<'_, 
 }
 
 impl<M: ArmModel<f64, N>, const N: usize> Run<'_, M, N> {
-    /// Goes to where the path begins, follows it, and stops the arm: brakes closed. `each` gets every sample of the path and
-    /// where the arm shall be then, `log` a line for every cycle from the beginning of the path on.
+    /// Goes to where the path begins, follows it, and stops the arm: brakes closed. `each` gets every sample
+    /// of the path and where the arm shall be then, `log` a line for every cycle from the beginning of the
+    /// path on.
     ///
     /// # Errors
     /// Where driver, arm or bus refuse, or the arm is stopped.

@@ -11,8 +11,8 @@ const EFFECTS: f64 = 0.25;
 const OF_LIMIT: f64 = 0.01;
 /// Share of the greatest friction on the path: it can hold a joint that came to rest.
 const FRICTION: f64 = 0.3;
-/// The error of a joint follows the torque that is missing with the loop's time constant: this number of cycles counts, before and
-/// after.
+/// The error of a joint follows the torque that is missing with the loop's time constant: this number of
+/// cycles counts, before and after.
 const CYCLES: usize = 60;
 /// A loop that is pushed goes beyond where it settles, and joints push each other.
 const DYNAMIC: f64 = 2.0;
@@ -50,8 +50,8 @@ impl<const N: usize> Tolerance<N> {
         Tolerance { missing: (0..now.len()).map(missing).collect(), give }
     }
 
-    /// By joint, rad, at a sample and with this stiffness (N·m/rad) of the loop. Infinite where the stiffness cannot be
-    /// inverted: the driver's other limits hold.
+    /// By joint, rad, at a sample and with this stiffness (N·m/rad) of the loop. Infinite where the stiffness
+    /// cannot be inverted: the driver's other limits hold.
     pub(super) fn at(&self, sample: usize, stiffness: &SMatrix<f64, N, N>) -> [f64; N] {
         let last = self.missing.len().saturating_sub(1);
         let (Some(missing), Some(yielding)) = (self.missing.get(sample.min(last)), stiffness.try_inverse())

@@ -102,7 +102,8 @@ pub struct Followed {
     pub delay: f64,
     /// Root mean square of the torque by joint, N·m, by its cause.
     pub torque: BTreeMap<String, TorqueParts>,
-    /// Bandwidth of the feedback, rad/s, and the largest pole of its sampled loop, where this program closes it.
+    /// Bandwidth of the feedback, rad/s, and the largest pole of its sampled loop, where this program closes
+    /// it.
     pub bandwidth: Option<f64>,
     /// See [`powerball_controller::laws::largest_pole`].
     pub largest_pole: Option<f64>,
@@ -114,7 +115,8 @@ pub struct Followed {
     /// Runs that were stopped because something touched the arm.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub contact: BTreeMap<String, Touched>,
-    /// Cycles of each run in which data of a joint was missing and its state was carried on; runs without any are left out.
+    /// Cycles of each run in which data of a joint was missing and its state was carried on; runs without any
+    /// are left out.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub carried_on: BTreeMap<String, u64>,
 }

@@ -88,8 +88,8 @@ fn impossible(study: &Study<'_>, model: &Model) -> Option<usize> {
     })
 }
 
-/// The accepted effect without which the logs to judge on are predicted better on its joints, or clearly better on all: what
-/// one joint gains others may lose, since they share their parameters.
+/// The accepted effect without which the logs to judge on are predicted better on its joints, or clearly
+/// better on all: what one joint gains others may lose, since they share their parameters.
 fn harmful(study: &Study<'_>, model: &Model) -> Option<usize> {
     *model.harmful.get_or_init(|| find_harmful(study, model))
 }

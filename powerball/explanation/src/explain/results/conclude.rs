@@ -164,8 +164,8 @@ fn not_named_elsewhere(named: &mut [NamedEffect]) {
     }
 }
 
-/// Pushes while the arm stood still are one effect with those on the way. No error of a row falls by them, since rows
-/// at rest are in no error.
+/// Pushes while the arm stood still are one effect with those on the way. No error of a row falls by them,
+/// since rows at rest are in no error.
 fn add_pushes_at_rest(
     named: &mut Vec<NamedEffect>,
     pushes: &[RestPush],

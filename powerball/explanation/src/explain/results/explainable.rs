@@ -204,7 +204,8 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
 mod tests {
     use super::*;
 
-    /// Rows of a joint that swings with another one; what is left is a law of its states and noise of standard deviation 1.
+    /// Rows of a joint that swings with another one; what is left is a law of its states and noise of
+    /// standard deviation 1.
     fn rows(seed: u64, law: impl Fn(&[f64]) -> f64) -> Rows {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let phases: Vec<f64> = (0..2).map(|_| rng.random_range(0.0..TAU)).collect();

@@ -55,8 +55,8 @@ pub struct Explained {
     pub held_out_change: Vec<Change>,
     /// Residual of white measurement noise alone in the band, by joint, N·m.
     pub noise_floor: Vec<f64>,
-    /// By joint, the share of the squared error left on the validation set that a smooth function of the joints' states
-    /// would take away there: much where a law is missing, little where the rest is noise.
+    /// By joint, the share of the squared error left on the validation set that a smooth function of the
+    /// joints' states would take away there: much where a law is missing, little where the rest is noise.
     pub explainable: Vec<f64>,
     /// Accepted effects in the order in which they were added.
     pub effects: Vec<NamedEffect>,
@@ -207,7 +207,8 @@ impl NextExperiment {
     }
 }
 
-// The plot that shows an effect: a joint's residual over the signal that the effect depends on, without it and with it.
+// The plot that shows an effect: a joint's residual over the signal that the effect depends on, without it
+// and with it.
 
 /// An effect on one joint, seen on the fitted logs.
 #[derive(Clone, Debug, PartialEq)]

@@ -50,7 +50,8 @@ pub struct Difference {
     pub value: Option<f64>,
 }
 
-/// An effect that is in some logs only: where, and with which torque on the fitted logs and on the validation set.
+/// An effect that is in some logs only: where, and with which torque on the fitted logs and on the validation
+/// set.
 struct Local {
     effect: String,
     joints: Vec<JointNumber>,

@@ -22,8 +22,8 @@ pub struct UnnamedLaw {
     pub coefficients: Vec<LawCoefficient>,
     /// The change of the rms error on the validation set by it, by joint: with it over without it, less 1.
     pub held_out_change: Vec<f64>,
-    /// 1 less the probability of as much by chance, over all that was tried: that something of these signals is
-    /// there, not that no other formula fits as well.
+    /// 1 less the probability of as much by chance, over all that was tried: that something of these signals
+    /// is there, not that no other formula fits as well.
     pub probability: f64,
     /// The named effect that came nearest.
     pub nearest: Option<String>,

@@ -169,10 +169,10 @@ fn kind(signals: &[(String, f64)], j: usize) -> String {
 ///
 /// * Probabilities lie between 0 and 1.
 /// * No name is given and refused on one joint.
-/// * A joint at the noise floor is not among those where something is left without a name; the error of one that is
-///   improved falls, that of one that is not predicted does not.
-/// * An experiment is of names that are open: of at most one that was given on these joints. Each stands in the answer,
-///   given, as a rival or as one that was considered.
+/// * A joint at the noise floor is not among those where something is left without a name; the error of one
+///   that is improved falls, that of one that is not predicted does not.
+/// * An experiment is of names that are open: of at most one that was given on these joints. Each stands in
+///   the answer, given, as a rival or as one that was considered.
 /// * No interval of a change lies on the wrong side of it.
 #[must_use]
 pub fn contradictions(explained: &Explained) -> Vec<String> {

@@ -84,9 +84,9 @@ fn draw(screen: &Screen<'_>, trials: &[&Trial], count: usize, seed: u64) -> Vec<
     by_trial.into_iter().enumerate().flat_map(of_trial).collect()
 }
 
-/// The score that the search of an effect for the logs and times that it is in exceeds by chance alone: its best
-/// candidate where the residual is shifted in time within each recording. What was looked for over many windows is
-/// compared with what is found over as many.
+/// The score that the search of an effect for the logs and times that it is in exceeds by chance alone: its
+/// best candidate where the residual is shifted in time within each recording. What was looked for over many
+/// windows is compared with what is found over as many.
 #[must_use]
 pub(crate) fn level_of_search(context: &Context<'_>, effect: &dyn Effect, seed: u64) -> f64 {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -166,8 +166,8 @@ fn rotated(values: &[f64], recordings: &[Range<usize>], shift: &Shift) -> Vec<f6
     values
 }
 
-// Columns shifted in time, thousands of times: their products with the base and with the residual are circular
-// cross-correlations, which one Fourier transform a column gives for all shifts.
+// Columns shifted in time, thousands of times: their products with the base and with the residual are
+// circular cross-correlations, which one Fourier transform a column gives for all shifts.
 
 /// How columns are changed into some that cannot be true.
 #[derive(Clone, Debug)]

@@ -48,7 +48,8 @@ const SHORTEST: f64 = 0.2;
 const ENOUGH_REST: f64 = 5.0;
 /// … as the value that this share of them does not exceed …
 const USUAL: f64 = 0.995;
-/// … and is otherwise this multiple of Coulomb friction, beyond which undisturbed joints stick in no measured log.
+/// … and is otherwise this multiple of Coulomb friction, beyond which undisturbed joints stick in no measured
+/// log.
 const STICKS: f64 = 3.0;
 /// Beyond that and the model's own error, in standard deviations of the torque at rest.
 const DEVIATIONS: f64 = 6.0;
@@ -242,8 +243,8 @@ impl Rest<'_> {
         self.left[joint].iter().zip(&self.calm).filter(|(_, calm)| **calm).map(|(left, _)| left.abs())
     }
 
-    /// The standard deviation of a joint's torque, by the median of its distance from its median; not 0, where a log
-    /// holds a torque that never changes.
+    /// The standard deviation of a joint's torque, by the median of its distance from its median; not 0,
+    /// where a log holds a torque that never changes.
     fn noise(&self, joint: usize) -> f64 {
         let usual = median(&mut self.left[joint].clone());
         let mut sizes: Vec<f64> = self.left[joint].iter().map(|r| (r - usual).abs()).collect();

@@ -30,7 +30,7 @@ pub(crate) struct ValidationOnlyEffect {
 /// One of several pushes, or a body.
 #[derive(Clone, Debug)]
 pub(crate) struct ValidationOnlyPart {
-    /// Its form in a model.
+    /// The change's form in a model.
     pub(crate) part: Part,
     /// The windows in which it acts.
     pub(crate) windows: Vec<Window>,
@@ -157,8 +157,9 @@ fn with_zeros(rule: &Rule, base: &Fit, (data, validation): (&Data<'_>, &Data<'_>
     (better, left)
 }
 
-/// Takes a body that all fitted logs have out of them, where the base model fitted to what stays predicts the validation
-/// set as it predicts the fitted logs. Returned with it are the fitted logs without it, and their base model.
+/// Takes a body that all fitted logs have out of them, where the base model fitted to what stays predicts the
+/// validation set as it predicts the fitted logs. Returned with it are the fitted logs without it, and their
+/// base model.
 fn taken_out_of_fitted<'a>(
     rule: &Rule,
     pooled: &Pooled<'_>,

@@ -40,7 +40,8 @@ const BODIES: [(f64, [f64; 3], f64); 5] = [
     (2.5, [0.5, 0.01, 0.02], 0.3),
     (3.0, [0.1, 0.01, 0.02], 0.08),
 ];
-/// A point on the rod: mass and place, off the line between the pins: no body on a single link has the same weight.
+/// A point on the rod: mass and place, off the line between the pins: no body on a single link has the same
+/// weight.
 const LOAD: (f64, [f64; 3]) = (1.5, [0.6, 0.15, 0.0]);
 const LOADED: [usize; 2] = [1, 4];
 const LOGS: usize = 6;
@@ -92,7 +93,8 @@ fn record(arm: &Arm, log: usize, rng: &mut ChaCha8Rng) -> Log {
     }
 }
 
-/// 1.5 kg on the rod are found there, and neither on the link that it turns with nor on the one that carries its pin.
+/// 1.5 kg on the rod are found there, and neither on the link that it turns with nor on the one that carries
+/// its pin.
 #[test]
 fn a_body_on_a_bar_is_found_on_the_bar() {
     let arm = Arm::parse(ARM, "arm.toml").unwrap();

@@ -8,8 +8,8 @@ use powerball_logs::log::{common_clock, read_logs};
 use powerball_logs::regression::RigidArm;
 use std::path::PathBuf;
 
-/// Thirteen seconds of a Rokae xMate: an elasticity of joint 2, which no fit by hand supports, made the error of joint 6
-/// on the third part three times as large.
+/// Thirteen seconds of a Rokae xMate: an elasticity of joint 2, which no fit by hand supports, made the error
+/// of joint 6 on the third part three times as large.
 #[test]
 fn what_one_joint_gains_others_do_not_lose() {
     let Some(folder) = measured("rokae") else { return };

@@ -198,7 +198,8 @@ fn the_same_push_is_seen_in_other_logs_and_another_one_is_not() {
     assert!(after < 0.1 * before, "{before} {after}");
 }
 
-/// What is wrong only as an arm sets off is how it sets off, and no hand; the same in the middle of a motion is one.
+/// What is wrong only as an arm sets off is how it sets off, and no hand; the same in the middle of a motion
+/// is one.
 #[test]
 fn no_push_is_seen_where_an_arm_sets_off() {
     const REST: usize = 400;
@@ -221,8 +222,8 @@ fn no_push_is_seen_where_an_arm_sets_off() {
     assert_eq!(named(6.1), "contact_wrench");
 }
 
-/// A force that grows slowly, turns as it does, and lets go at once is one push: it is found with its length and
-/// its largest force, and little is left.
+/// A force that grows slowly, turns as it does, and lets go at once is one push: it is found with its length
+/// and its largest force, and little is left.
 #[test]
 fn a_push_of_another_shape_is_one_push_that_leaves_nothing() {
     const FORCE: f64 = 12.0;
@@ -275,8 +276,8 @@ fn pushes_close_to_each_other_are_distinguished() {
     }
 }
 
-/// What is bolted to a link that is not the last is a body on that link. Where the link's joint stands still in
-/// space its mass does not show, and is not given.
+/// What is bolted to a link that is not the last is a body on that link. Where the link's joint stands still
+/// in space its mass does not show, and is not given.
 #[test]
 fn a_body_on_another_link_is_found_there() {
     let (arm, usual) = planar();
@@ -337,8 +338,8 @@ fn the_error_of_a_mass_contains_what_is_taken_of_its_inertia() {
     assert!((found - mass).abs() < 1.96 * std && std < 0.1 * mass, "{found} ± {std}");
 }
 
-/// On an axis that feels no weight a load that pulls during a whole log is one force from its beginning to its
-/// end: no body held to the end could be meant.
+/// On an axis that feels no weight a load that pulls during a whole log is one force from its beginning to
+/// its end: no body held to the end could be meant.
 #[test]
 fn a_load_along_a_level_axis_lasts_for_its_whole_log() {
     const LOAD: f64 = 196.0;
@@ -486,8 +487,9 @@ fn the_zeros_of_parallel_encoders_do_not_outvote_a_body_that_lies_aside() {
     at_the_floor(&explained);
 }
 
-/// A force in the plane, N, half a wave from 3 to 4 s after the motion ended, or from 6 s to the end of the log; friction of
-/// the two joints hides 4 and 2 N·m either way. Where brakes hold the arm and motors do not, nothing touches it.
+/// A force in the plane, N, half a wave from 3 to 4 s after the motion ended, or from 6 s to the end of the
+/// log; friction of the two joints hides 4 and 2 N·m either way. Where brakes hold the arm and motors do not,
+/// nothing touches it.
 #[test]
 fn a_touch_of_an_arm_that_stands_still_is_seen_and_a_brake_is_not() {
     const FORCE: f64 = 60.0;

@@ -82,8 +82,8 @@ fn intervals_cover_the_truth() {
     assert!((0.89..=0.99).contains(&covered), "{covered}");
 }
 
-/// Friction of one term: both terms of the fit have nearly one steepness on some joints, and their coefficients cancel
-/// each other at every velocity.
+/// Friction of one term: both terms of the fit have nearly one steepness on some joints, and their
+/// coefficients cancel each other at every velocity.
 #[test]
 fn friction_of_one_term_has_errors_at_every_velocity() {
     let (body, _) = truth();

@@ -42,8 +42,8 @@ fn the_bend_is_found_in_slow_motion() {
     println!("at most {:.2} % of the friction is left", 100.0 * worst);
 }
 
-/// Columns that are kept are those of a data set that has none yet, whatever was asked before, and a level is made once
-/// wherever it stands in a pair.
+/// Columns that are kept are those of a data set that has none yet, whatever was asked before, and a level is
+/// made once wherever it stands in a pair.
 #[test]
 fn kept_columns_are_those_made_anew() {
     let (body, _) = truth();

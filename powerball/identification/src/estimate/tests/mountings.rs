@@ -106,7 +106,8 @@ fn a_wrong_mounting_contradicts_the_others() {
     assert!(errors[1].rms[1] > 5.0 * own.rms[1], "{:?} {:?}", errors[1].rms, own.rms);
 }
 
-/// The torque columns of two joints are exchanged in the logs of the second mounting alone: its warning says so.
+/// The torque columns of two joints are exchanged in the logs of the second mounting alone: its warning says
+/// so.
 #[test]
 fn columns_that_are_exchanged_in_one_mounting_are_named() {
     let arm = lwa4p::arm().unwrap();

@@ -26,8 +26,8 @@ alpha = 0
 /// Coulomb and viscous friction of a joint, N·m and N·m·s/rad.
 const FRICTION: [f64; 2] = [3.0, 1.5];
 
-/// A log of an arm along a path with waves up to `top` Hz: torque of the minimal set's `values`, sharp Coulomb
-/// friction and viscous friction, without noise.
+/// A log of an arm along a path with waves up to `top` Hz: torque of the minimal set's `values`, sharp
+/// Coulomb friction and viscous friction, without noise.
 fn log(body: &RigidArm, values: &[f64], friction: &[[f64; 2]], rate: f64, top: f64, seed: u64) -> Log {
     let n = body.dof();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -85,8 +85,8 @@ fn case(
     (body, values, friction, log)
 }
 
-/// Any arm, rate and bandwidth below what positions are smoothed to: at most half a percent of a joint's torque is
-/// left, and every parameter is found to half a percent.
+/// Any arm, rate and bandwidth below what positions are smoothed to: at most half a percent of a joint's
+/// torque is left, and every parameter is found to half a percent.
 #[test]
 fn a_log_of_the_model_itself_leaves_nothing() {
     let arms = [
@@ -114,7 +114,8 @@ fn a_log_of_the_model_itself_leaves_nothing() {
     }
 }
 
-/// What is linear in the motion is exact in any band, also of a path with more in it than positions are smoothed to.
+/// What is linear in the motion is exact in any band, also of a path with more in it than positions are
+/// smoothed to.
 #[test]
 fn what_is_linear_is_exact_whatever_the_path_holds() {
     for (rate, top) in [(100.0, 30.0), (250.0, 60.0), (1000.0, 60.0)] {

@@ -1,6 +1,7 @@
 //! Electronic data sheets (EDS) and device configuration files (DCF) of CiA 306, as makers really write them:
-//! latin-1, UTF-8 or UTF-16 with its mark, any case, `$NODEID + 0x80` anywhere in a number, names that repeat, comments behind values,
-//! arrays whose parts share one section (`CompactSubObj`), types that the file defines itself.
+//! latin-1, UTF-8 or UTF-16 with its mark, any case, `$NODEID + 0x80` anywhere in a number, names that
+//! repeat, comments behind values, arrays whose parts share one section (`CompactSubObj`), types that the
+//! file defines itself.
 //!
 //! Not read: `[DummyUsage]` (types that fill a PDO are not objects) and `CompactPDO` (PDOs without sections).
 
@@ -88,7 +89,8 @@ pub struct Dcf {
 }
 
 impl Dcf {
-    /// The dictionary in a file's bytes. Bytes that are neither UTF-8 nor begin with the mark of UTF-16 are latin-1.
+    /// The dictionary in a file's bytes. Bytes that are neither UTF-8 nor begin with the mark of UTF-16 are
+    /// latin-1.
     ///
     /// # Errors
     /// The first line that cannot be read, with what was expected.
@@ -173,8 +175,8 @@ impl Dcf {
         Ok(())
     }
 
-    /// Takes `overlay`'s values (`ParameterValue`, else `DefaultValue`) for this dictionary's objects, and its
-    /// node id and bit rate.
+    /// Takes `overlay`'s values (`ParameterValue`, else `DefaultValue`) for this dictionary's objects, and
+    /// its node id and bit rate.
     ///
     /// # Errors
     /// Where `overlay` has an object that this dictionary has not.

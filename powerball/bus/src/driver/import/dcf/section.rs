@@ -113,7 +113,8 @@ impl Section {
         }
     }
 
-    /// A type that the file defines, as CANFestival's editor does: `[A0sub1]` has its type of CiA 301 as its value.
+    /// A type that the file defines, as CANFestival's editor does: `[A0sub1]` has its type of CiA 301 as its
+    /// value.
     pub(super) fn defined_type(&self) -> Option<(u16, u16)> {
         let lower = self.name.to_ascii_lowercase();
         let number = u16::from_str_radix(lower.strip_suffix("sub1")?, 16).ok()?;

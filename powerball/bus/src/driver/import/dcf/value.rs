@@ -22,8 +22,8 @@ impl Number {
         self.factor != 0
     }
 
-    /// `0x80`, `0200` (octal, as CiA 306 has it), `-3`, `$NODEID+0x180`, `0x80 + $NodeID`; what follows a `;` is a
-    /// comment.
+    /// `0x80`, `0200` (octal, as CiA 306 has it), `-3`, `$NODEID+0x180`, `0x80 + $NodeID`; what follows a `;`
+    /// is a comment.
     pub(super) fn parse(text: &str) -> Option<Number> {
         let mut sum = Number::constant(0);
         // A sign begins a term; what stands before the first one is a term too.
@@ -83,8 +83,8 @@ pub enum Value {
 }
 
 impl Value {
-    /// A value of `data_type`. Bytes that are not written in hexadecimal, and reals that are, have a form of the
-    /// maker's own: no value.
+    /// A value of `data_type`. Bytes that are not written in hexadecimal, and reals that are, have a form of
+    /// the maker's own: no value.
     pub(super) fn parse(data_type: u16, text: &str) -> Result<Option<Value>, NoNumber> {
         let number = || Number::parse(text).ok_or(NoNumber);
         Ok(Some(match (data_type, bits(data_type)) {

@@ -17,16 +17,17 @@ const FLOOR: f64 = -0.2;
 /// The surroundings with which motions are checked before the arm moves.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Surroundings {
-    /// The arm file: its geometry and limits, for the floor, the links and the torques; the built-in hardware arm
-    /// where this is left out.
+    /// The arm file: its geometry and limits, for the floor, the links and the torques; the built-in hardware
+    /// arm where this is left out.
     #[arg(long, value_name = "ARM.toml")]
     pub(crate) arm: Option<PathBuf>,
-    /// Height of the floor above the base frame's origin along the vertical, m, or `none`. Where this is left out it is
-    /// -0.2 under the upright built-in arm, and as for `powerball excite` under others.
+    /// Height of the floor above the base frame's origin along the vertical, m, or `none`. Where this is left
+    /// out it is -0.2 under the upright built-in arm, and as for `powerball excite` under others.
     #[arg(long, value_name = "Z", value_parser = floor, allow_hyphen_values = true)]
     floor: Option<FloorAt>,
-    /// The arm's masses for the torques: an identified.json, or a values file `{"parameter": number, …}`. Where this is
-    /// left out they are the CAD model's of the built-in arm, and guessed from the capsules for another arm file.
+    /// The arm's masses for the torques: an identified.json, or a values file `{"parameter": number, …}`.
+    /// Where this is left out they are the CAD model's of the built-in arm, and guessed from the capsules for
+    /// another arm file.
     #[arg(long, value_name = "FILE.json")]
     values: Option<PathBuf>,
 }

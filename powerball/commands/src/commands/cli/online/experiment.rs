@@ -85,8 +85,8 @@ impl Experiment {
 }
 
 impl Opened {
-    /// Records the experiment into the folder of the results and reads its log, with what is to be reported about that;
-    /// no log where there is no path that could tell names apart.
+    /// Records the experiment into the folder of the results and reads its log, with what is to be reported
+    /// about that; no log where there is no path that could tell names apart.
     pub(in super::super) fn recorded(
         self,
         motion: Option<&Motion>,

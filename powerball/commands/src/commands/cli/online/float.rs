@@ -21,25 +21,28 @@ use std::path::{Path, PathBuf};
 
 /// The hand of --push: N·m/rad and N·m·s/rad.
 const HAND: [f64; 2] = [300.0, 20.0];
-/// A hand may push with this part of each joint's torque before the driver's guard takes it for a drive that does not obey.
+/// A hand may push with this part of each joint's torque before the driver's guard takes it for a drive that
+/// does not obey.
 pub(super) const PUSH: f64 = 0.4;
 /// Drift counts from this long after the hand let go, s.
 const SETTLE: f64 = 1.0;
 /// Without a hand and without --for the virtual arm floats for this long, s.
 const ALONE: f64 = 10.0;
 
-/// Take weight and friction off the hand that guides the arm, in the drives' current mode; an arm that rests is not pushed.
+/// Take weight and friction off the hand that guides the arm, in the drives' current mode; an arm that rests
+/// is not pushed.
 ///
-/// Nothing of this was run on hardware by this project: try --bus virtual first. Effects of the model that depend on
-/// positions alone (springs, ripple, constant torques) are taken off as well, those that are friction are left to the hand.
-/// The arm is enabled where it stands. Set-points pass the driver's guards, which stop the arm beyond its limits; Ctrl-C
-/// stops it. THE ARM IS LOOSE: WHATEVER THE MODEL GETS WRONG OF ITS WEIGHT MOVES IT.
+/// Nothing of this was run on hardware by this project: try --bus virtual first. Effects of the model that
+/// depend on positions alone (springs, ripple, constant torques) are taken off as well, those that are
+/// friction are left to the hand. The arm is enabled where it stands. Set-points pass the driver's guards,
+/// which stop the arm beyond its limits; Ctrl-C stops it. THE ARM IS LOOSE: WHATEVER THE MODEL GETS WRONG OF
+/// ITS WEIGHT MOVES IT.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  \
-    powerball float --arm demo/arm.toml --model demo/model.json --plant demo/virtual_arm.json --push push.csv\n  \
-    powerball float --model model.json --bus socketcan:can0 --accept-unverified --for 60\n\n\
-    --push: CSV with t and q1…q6 (rad). A hand (300 N·m/rad, 20 N·m·s/rad at each joint) pulls the virtual arm along it, from \
-    where it begins, and lets go at its end.")]
+    powerball float --arm demo/arm.toml --model demo/model.json --plant demo/virtual_arm.json --push \
+    push.csv\n  powerball float --model model.json --bus socketcan:can0 --accept-unverified --for 60\n\n\
+    --push: CSV with t and q1…q6 (rad). A hand (300 N·m/rad, 20 N·m·s/rad at each joint) pulls the virtual \
+    arm along it, from where it begins, and lets go at its end.")]
 pub(crate) struct FloatCommand {
     #[command(flatten)]
     on: ModelOnBus,

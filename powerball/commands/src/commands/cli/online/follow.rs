@@ -43,8 +43,8 @@ enum With {
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  powerball demo --effect spring --out demo\n  \
     powerball excite --arm demo/arm.toml --out path.csv\n  \
-    powerball follow --trajectory path.csv --arm demo/arm.toml --model demo/model.json --plant demo/virtual_arm.json \
-    --with torque --compare base --out followed\n\n\
+    powerball follow --trajectory path.csv --arm demo/arm.toml --model demo/model.json --plant \
+    demo/virtual_arm.json --with torque --compare base --out followed\n\n\
     The delay of drives that interpolate (the same for all joints and runs) is estimated and removed from \
     the error.")]
 pub(crate) struct FollowCommand {
@@ -56,8 +56,8 @@ pub(crate) struct FollowCommand {
     /// How the model is used.
     #[arg(long = "with", value_enum, default_value = "feedforward")]
     with: With,
-    /// What to compare with: `base` (the model's rigid arm and friction alone), another model's file (reported as
-    /// base), or `feedback` (nothing fed forward). May be repeated.
+    /// What to compare with: `base` (the model's rigid arm and friction alone), another model's file
+    /// (reported as base), or `feedback` (nothing fed forward). May be repeated.
     #[arg(long, value_name = "base|FILE.json|feedback")]
     compare: Vec<String>,
     /// Bandwidth of the feedback in current mode, rad/s: 20 for computed torque at 200 Hz, 8 for impedance.
@@ -66,7 +66,8 @@ pub(crate) struct FollowCommand {
     /// Damping ratio of the feedback in current mode.
     #[arg(long, value_name = "RATIO", default_value_t = 1.0, allow_negative_numbers = true)]
     damping: f64,
-    /// Stop the arm where its external torque is more than the model's error can be, in current mode: something touches it.
+    /// Stop the arm where its external torque is more than the model's error can be, in current mode:
+    /// something touches it.
     #[arg(long)]
     stop_at_contact: bool,
     /// How far a push may take a joint off its path in current mode before the arm is stopped, rad, 0 to 0.5,
@@ -199,7 +200,8 @@ impl FollowCommand {
         let bandwidth = self.bandwidth();
         if bandwidth.is_some_and(|w| !positive(w)) || !positive(self.damping) {
             return Err(Failure::Unusable(format!(
-                "--bandwidth and --damping must be above 0: a loop with {} rad/s and a ratio of {} is not stable",
+                "--bandwidth and --damping must be above 0: a loop with {} rad/s and a ratio of {} is not \
+                stable",
                 bandwidth.unwrap_or_default(),
                 self.damping
             )));
@@ -292,7 +294,8 @@ impl FollowCommand {
         match result.contact.iter().next() {
             None => Ok(()),
             Some((name, contact)) => Err(Failure::Refused(format!(
-                "stopped at {:.2} s with the {name} model: something touches the arm at link {} or beyond, {:.1} N·m at joint {}",
+                "stopped at {:.2} s with the {name} model: something touches the arm at link {} or beyond, \
+                {:.1} N·m at joint {}",
                 contact.t, contact.link, contact.torque, contact.joint
             ))),
         }

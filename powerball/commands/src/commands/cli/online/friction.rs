@@ -19,8 +19,8 @@ use powerball_virtual_arm::{VirtualArm, lwa4p};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Move each joint at 18 constant velocities each way where gravity does not load it, and fit friction laws (Eq.
-/// 15, Eq. 16, Stribeck).
+/// Move each joint at 18 constant velocities each way where gravity does not load it, and fit friction laws
+/// (Eq. 15, Eq. 16, Stribeck).
 ///
 /// Writes friction_K.csv for each joint as it is recorded, friction.json and report.html. An interrupted run
 /// continues with its joint. Joints that need another mounting of the base are named; the virtual arm is

@@ -11,7 +11,8 @@ const LOOK: u64 = 100_000;
 /// Without a complete cycle for this long it is reported that nothing is heard, µs.
 const SILENCE: u64 = 2_000_000;
 
-/// Hears the LWA 4P's process data and gives a sample a cycle, until Ctrl-C or `seconds` have passed; sends nothing.
+/// Hears the LWA 4P's process data and gives a sample a cycle, until Ctrl-C or `seconds` have passed; sends
+/// nothing.
 ///
 /// # Errors
 /// A bus that is within this program or cannot be opened, process data that is mapped otherwise.

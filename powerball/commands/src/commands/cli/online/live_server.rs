@@ -1,8 +1,8 @@
 //! The server behind `--serve`.
 //!
-//! It runs in the process that moves the arm, so it accepts little: only GET, no bodies, short requests, few
-//! connections, short waits; and it shows its page only to a client with the token of the printed address. It
-//! has its own thread, and the cycle never waits for it.
+//! The server runs in the process that moves the arm, so it accepts little: only GET, no bodies, short
+//! requests, few connections, short waits; and it shows its page only to a client with the token of the
+//! printed address. It has its own thread, and the cycle never waits for it.
 
 use crate::report::stream_page;
 use hyper::body::{Body, Bytes, Frame, Incoming, SizeHint};
@@ -198,7 +198,8 @@ impl History {
         self.waiting.drain(..).for_each(Waker::wake);
     }
 
-    /// The message number `next`, or the first after it that is still there; with the number of the one behind it.
+    /// The message number `next`, or the first after it that is still there; with the number of the one
+    /// behind it.
     fn get(&self, next: usize) -> Option<(Bytes, usize)> {
         let place = if next == 0 { 0 } else { next.saturating_sub(self.dropped).max(1) };
         let message = self.messages.get(place)?;

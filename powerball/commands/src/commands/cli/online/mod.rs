@@ -1,4 +1,5 @@
-//! Commands that talk with an arm, real or virtual, or listen to one as it moves; and what explains one that moved.
+//! Commands that talk with an arm, real or virtual, or listen to one as it moves; and what explains one that
+//! moved.
 
 mod bus;
 mod demo;
@@ -31,7 +32,8 @@ pub(super) enum Command {
     VirtualArm(virtual_arm::VirtualArmCommand),
     /// Follow a trajectory on a bus and log it.
     Record(record::RecordCommand),
-    /// Follow a trajectory with a torque model; tracking error with it and with a base model. Never run on hardware.
+    /// Follow a trajectory with a torque model; tracking error with it and with a base model. Never run on
+    /// hardware.
     Follow(follow::FollowCommand),
     /// Take weight and friction off the hand that guides the arm. Never run on hardware.
     Float(float::FloatCommand),

@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 /// Arm, model and bus.
 #[derive(Args, Debug)]
 pub(crate) struct ModelOnBus {
-    /// The torque model: model.json of `powerball explain` or identified.json of `powerball identify`, for the same arm
-    /// file.
+    /// The torque model: model.json of `powerball explain` or identified.json of `powerball identify`, for
+    /// the same arm file.
     #[arg(long, value_name = "FILE.json")]
     pub(crate) model: PathBuf,
     #[command(flatten)]
@@ -35,7 +35,8 @@ pub(crate) struct ModelOnBus {
 }
 
 impl ModelOnBus {
-    /// The arm file and the model, and what motions must keep: with the model's masses where no values were given.
+    /// The arm file and the model, and what motions must keep: with the model's masses where no values were
+    /// given.
     pub(crate) fn read(&mut self) -> Result<(Arm, ModelArm, Envelope<6>), Failure> {
         if self.plant.is_some() && self.place.bus != BusUrl::Virtual {
             return Err(Failure::Unusable("--plant works only with --bus virtual".into()));
@@ -54,7 +55,8 @@ impl ModelOnBus {
         self.consent.accept_unverified || self.place.bus == BusUrl::Virtual
     }
 
-    /// A driver of the arm; where the bus is virtual the arm stands at `start`, with a hand on it if there is one.
+    /// A driver of the arm; where the bus is virtual the arm stands at `start`, with a hand on it if there is
+    /// one.
     pub(crate) fn master(
         &self,
         profile: Profile<6>,
@@ -68,7 +70,8 @@ impl ModelOnBus {
         self.place.driver_of(profile, bus, self.consent)
     }
 
-    /// The plant of --bus virtual: the file that is given, else the one next to the arm file, as for `explain --experiment`.
+    /// The plant of --bus virtual: the file that is given, else the one next to the arm file, as for
+    /// `explain --experiment`.
     fn plant_file(&self) -> Option<PathBuf> {
         self.plant.clone().or_else(|| self.surroundings.arm.as_deref().and_then(Undeclared::next_to))
     }

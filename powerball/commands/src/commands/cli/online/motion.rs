@@ -5,8 +5,8 @@ use crate::procedure::MotionLog;
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use std::path::Path;
 
-/// A line on standard error, where a person looks at it, that is written over by the next one and cut at the terminal's
-/// width: how far a motion has come. The last one stays.
+/// A line on standard error, where a person looks at it, that is written over by the next one and cut at the
+/// terminal's width: how far a motion has come. The last one stays.
 pub(super) fn live<T: std::fmt::Display>() -> impl FnMut(&T) {
     let line = ProgressBar::no_length().with_style(
         ProgressStyle::with_template("  {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner()),

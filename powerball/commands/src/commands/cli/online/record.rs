@@ -16,8 +16,9 @@ use std::path::PathBuf;
 /// Bring the arm up, go to where a trajectory begins, follow it at 200 Hz, and log it.
 ///
 /// The log has t (s, the measured time of each SYNC), q1…q6 (rad), tau1…tau6 (N·m, as good as the profile's
-/// calibration), ref1…ref6 (rad, the set-points), dq1…dq6 (rad/s, the drives' own), status1…status6 (statuswords),
-/// answer1…answer6 (s from SYNC to the joint's data), and late, skipped, dropped (counts since it began).
+/// calibration), ref1…ref6 (rad, the set-points), dq1…dq6 (rad/s, the drives' own), status1…status6
+/// (statuswords), answer1…answer6 (s from SYNC to the joint's data), and late, skipped, dropped (counts since
+/// it began).
 ///
 /// Each line is written whole: whatever happens, the log can be read up to there. A log whose name ends in
 /// .parquet or .mcap is written as lines next to it, NAME.parquet.csv, and becomes that when it ends; lines

@@ -27,9 +27,10 @@ use std::path::PathBuf;
 /// explained on and friction stays within `--friction-range`. Rows at rest are not watched.
 #[derive(Args, Debug)]
 #[command(
-    after_help = "Examples:\n  powerball watch --arm arm.toml --model result/model.json --log today.csv --json\n  \
-    ros2_to_csv | powerball watch --arm arm.toml --model result/model.json -\n\n\
-    With - rows are read from standard input as they come: CSV with a header line, or an object with the same\n\
+    after_help = "Examples:\n  powerball watch --arm arm.toml --model result/model.json --log today.csv \
+    --json\n  ros2_to_csv | powerball watch --arm arm.toml --model result/model.json -\n\n\
+    With - rows are read from standard input as they come: CSV with a header line, or an object with the \
+    same\n\
     keys on each line ({\"t\": 0.005, \"q1\": …, \"tau1\": …} or {\"t\": 0.005, \"q\": […], \"tau\": […]})."
 )]
 #[command(group(clap::ArgGroup::new("from").required(true).args(["log", "bus", "stream"])))]
@@ -43,8 +44,8 @@ pub(crate) struct WatchCommand {
     /// Logs, each watched on its own (CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5).
     #[arg(long, value_name = "FILE", num_args = 1..)]
     log: Vec<PathBuf>,
-    /// A bus on which another master moves the LWA 4P: socketcan:can0, slcan:/dev/ttyACM0 or udp:239.74.163.2:43113.
-    /// Nothing is sent.
+    /// A bus on which another master moves the LWA 4P: socketcan:can0, slcan:/dev/ttyACM0 or
+    /// udp:239.74.163.2:43113. Nothing is sent.
     #[arg(long, value_name = "URL")]
     bus: Option<BusUrl>,
     /// Listen to the bus for this many seconds; else until Ctrl-C.
@@ -177,7 +178,8 @@ impl WatchCommand {
         let file = self.model.display();
         if !model.arm.is_empty() && !arm.name.is_empty() && model.arm != arm.name {
             return Err(Failure::Unusable(format!(
-                "{file}: is a model of the arm '{}', {} is of '{}': give the arm file that the model was made with",
+                "{file}: is a model of the arm '{}', {} is of '{}': give the arm file that the model was \
+                made with",
                 model.arm,
                 self.arm.display(),
                 arm.name

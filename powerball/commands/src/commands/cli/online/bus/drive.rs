@@ -134,7 +134,8 @@ fn list(values: &[f64]) -> String {
 }
 
 impl Stop {
-    /// The bus, when it is time to stop the arm. Nothing may be in the way then, not even a word on standard error.
+    /// The bus, when it is time to stop the arm. Nothing may be in the way then, not even a word on standard
+    /// error.
     fn bus(&self) -> Result<Box<dyn Bus>, Failure> {
         #[cfg(unix)]
         if self.watchdog {
@@ -153,8 +154,8 @@ impl Stop {
         use powerball_bus::transport::blocking;
         let mut bus = self.bus()?;
         let nodes: Vec<NodeId> = LWA4P.joints.iter().map(|joint| joint.node).collect();
-        // In one frame for all of them: leaving "operational" ends the set-points of whoever gives them. Then the
-        // stop, to all drives before any answer is awaited.
+        // In one frame for all of them: leaving "operational" ends the set-points of whoever gives them. Then
+        // the stop, to all drives before any answer is awaited.
         bus.send(&nmt::Command::EnterPreOperational.frame(None)).map_err(refused)?;
         let words = [
             (Controlword::command(Command::QuickStop), 400_000),

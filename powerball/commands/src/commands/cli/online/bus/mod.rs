@@ -67,8 +67,9 @@ impl BusCommand {
 /// The arguments of every command on a bus.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Where {
-    /// The bus: virtual, socketcan:can0, slcan:/dev/ttyACM0 (500 kbit/s; others with ?bitrate=250000 behind it),
-    /// udp:239.74.163.2:43113 (this machine alone) or udp:239.74.163.2:43113@eth0 (the network of that interface).
+    /// The bus: virtual, socketcan:can0, slcan:/dev/ttyACM0 (500 kbit/s; others with ?bitrate=250000 behind
+    /// it), udp:239.74.163.2:43113 (this machine alone) or udp:239.74.163.2:43113@eth0 (the network of that
+    /// interface).
     #[arg(long, value_name = "URL", default_value = "virtual")]
     pub(crate) bus: BusUrl,
     /// Print the result as one JSON object on standard output.
@@ -79,8 +80,9 @@ pub(crate) struct Where {
 /// Options of a command that configures drives.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct Consent {
-    /// You accept what was not verified: drives whose device type (0x1000) or identity (0x1018) is another than the
-    /// profile says, each with a warning; and the current mode, which this project has never seen on an arm.
+    /// You accept what was not verified: drives whose device type (0x1000) or identity (0x1018) is another
+    /// than the profile says, each with a warning; and the current mode, which this project has never seen on
+    /// an arm.
     #[arg(long)]
     pub(crate) accept_unverified: bool,
 }
@@ -146,8 +148,8 @@ impl Where {
         Ok(master)
     }
 
-    /// This program once more, with the same priority, to stop the arm where this process dies. A serial adapter cannot be
-    /// opened twice.
+    /// This program once more, with the same priority, to stop the arm where this process dies. A serial
+    /// adapter cannot be opened twice.
     #[cfg(unix)]
     fn watchdog(&self) -> Option<transport::Watchdog> {
         if matches!(self.bus, BusUrl::Virtual | BusUrl::Slcan(..)) {

@@ -69,7 +69,8 @@ impl Scan {
     }
 }
 
-/// Asks everybody at once, and those who answer for their serial numbers: of two devices with one id both answer.
+/// Asks everybody at once, and those who answer for their serial numbers: of two devices with one id both
+/// answer.
 fn ask(bus: &mut dyn Bus) -> Result<BTreeMap<u8, Found>, Failure> {
     let mut found: BTreeMap<u8, Found> = BTreeMap::new();
     let heard = ask_all(bus, 1..=127, objects::DEVICE_TYPE)?;
