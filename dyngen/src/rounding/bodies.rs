@@ -138,7 +138,7 @@ impl Body {
         match kind {
             JointKind::Prismatic => self.mass,
             JointKind::Revolute => {
-                // About the origin it is zᵀIz; the axis goes through another point p: v = z × (r − p).
+                // About the origin it is zᵀ·I·z; the axis goes through another point p: v = z × (r − p).
                 let arm = axis.z.cross(&axis.point);
                 let moved = self.about_origin * axis.z;
                 axis.z.dot(&moved) - 2.0 * arm.dot(&axis.z.cross(&self.moment))
