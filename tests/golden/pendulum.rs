@@ -638,8 +638,8 @@ mod trigonometry {
         0, 0xa2f9_836e, 0x4e44_1529, 0xfc27_57d1, 0xf534_ddc0, 0xdb62_9599, 0x3c43_9041,
         0xfe51_63ab,
     ];
-    /// Quarter turns, −2 … 1, and what is left of an angle from π/4 on in two parts, by integers: exact for every `f32`
-    /// (Payne and Hanek).
+    /// Quarter turns, −2 … 1, and what is left of an angle from π/4 on in two parts, by integers: exact for every
+    /// `f32` (Payne and Hanek).
     #[inline(always)]
     fn reduced(angle: f32) -> [f32; 3] {
         let bits = angle.to_bits();

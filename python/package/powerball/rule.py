@@ -124,7 +124,8 @@ class Rule:
     #: What is left of a joint below this share of its torque needs no name, whatever it depends on: a law
     #: that is missing often leaves less than ``predicted_share``.
     little_share: float = 0.05
-    #: Below this time of motion a reader is warned that the folds are too short to tell much, s.
+    #: Below this time of motion a reader is warned that the folds are too short to tell much, and servos
+    #: have no friction that changes with running time, s.
     least_time: float = 30.0
     #: A share of accepted surrogates above this is no chance: the residuals are not what the tests take
     #: them for, and a reader is warned.

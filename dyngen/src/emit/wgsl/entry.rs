@@ -36,8 +36,8 @@ pub(super) fn bindings(names: &Names, parts: &Parts<'_>) -> String {
     });
     format!(
         "// How many states there are.\n@group(0) @binding(0) var<uniform> {prefix}_count: u32;\n{}\
-         // The result of whichever function is called.\n@group(0) @binding({RESULT}) var<storage, read_write>
-         // \
+         // The result of whichever function is called.\n\
+         @group(0) @binding({RESULT}) var<storage, read_write> \
          {prefix}_result: array<f32>;\n",
         inputs.collect::<String>()
     )

@@ -84,7 +84,7 @@ fn explain_joint(
     let base = joint.problem.in_logs(&arm.body, logs, j);
     let base_validate = joint.problem.in_logs(&arm.body, validate, j);
     result.before.add(&errors(&base, &[]), &errors(&base_validate, &[]));
-    let all = candidates::all(&joint, arm);
+    let all = candidates::all(&joint, arm, rule);
     candidates::name(&mut joint, &mut result.effects, all, (arm, held_out), rule);
     report_odd(result, arm, &joint, (logs, validate), &found, j);
     Ok(())

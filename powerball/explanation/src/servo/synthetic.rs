@@ -136,7 +136,7 @@ fn friction_that_falls_with_the_temperature_or_with_running_time_is_named() {
     let found = Plant { warmth: -0.5, ..Plant::default() }.named(8.0, true);
     assert!(matches!(found.as_slice(), [one] if one.effect == "temperature"), "{found:?}");
     assert!((number(&found[0], "change") + 0.5).abs() < 0.1, "{found:?}");
-    let found = Plant { warmth: -0.6, warm_in: 20.0, ..Plant::default() }.named(15.0, false);
+    let found = Plant { warmth: -0.6, warm_in: 20.0, ..Plant::default() }.named(16.0, false);
     assert!(matches!(found.as_slice(), [one] if one.effect == "temperature"), "{found:?}");
     assert!((number(&found[0], "change") + 0.6).abs() < 0.2, "{found:?}");
 }

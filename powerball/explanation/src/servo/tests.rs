@@ -163,7 +163,7 @@ fn on_the_other_mass(measured: &Measured, own: (usize, f64, u32), most: usize) -
     let mut problem = Problem::new(&servos.body, &logs, 0, &servos.known(0)).unwrap();
     problem.roles.retain(|role| *role != Role::Constant(Constant::Load));
     let mut joint = Joint::solve(problem);
-    let (mut effects, mut all) = (Vec::new(), candidates::all(&joint, &servos));
+    let (mut effects, mut all) = (Vec::new(), candidates::all(&joint, &servos, &Rule::default()));
     all.truncate(most);
     candidates::name(&mut joint, &mut effects, all, (&servos, &validate), &Rule::default());
     let others = measured.logs((other.0, own.1, own.2), 1);
