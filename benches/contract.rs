@@ -4,7 +4,7 @@
 //! `cargo bench -p powerball-benches --bench contract -- --write docs/dyngen.md` writes its table into the
 //! page.
 
-#![allow(clippy::unwrap_used, missing_docs)]
+#![allow(clippy::unwrap_used, missing_docs, unreachable_pub)]
 
 mod support;
 

@@ -100,7 +100,7 @@ impl MassMatrix {
         let m = self.varied.len();
         let mut largest = Vec::with_capacity(self.n);
         for i in 0..self.n {
-            let Some((place, negative)) = self.entries[i * self.n + i] else { return None };
+            let (place, negative) = self.entries[i * self.n + i]?;
             // The bound over a box, and the variable that adds most to it.
             let mut bound = |ranges: &[Interval]| -> Option<(f64, Option<usize>)> {
                 gradient.evaluate(&self.code, ranges, &self.varied)?;

@@ -74,10 +74,11 @@ impl Plant {
     fn logs(&self, seconds: f64, arm: &dyngen::Arm, warm: bool) -> (Vec<ServoLog>, Vec<ServoLog>) {
         let one = |k: usize| {
             let w = 1.0 + 0.17 * k as f64;
-            let clock = if k % 2 == 0 { 0.0 } else { seconds };
+            let clock = if k.is_multiple_of(2) { 0.0 } else { seconds };
             let steps = |t: f64| [0.3, 1.2, -0.9, 0.4, -1.3, 0.8][(1.7 * t) as usize % 6];
             let waves = |t: f64| 0.9 * (2.0 * w * t).sin() + 0.5 * (3.3 * w * t).sin();
-            let own = self.run(seconds, clock, |t| if k % 2 == 0 { w * steps(w * t) } else { waves(t) });
+            let own =
+                self.run(seconds, clock, |t| if k.is_multiple_of(2) { w * steps(w * t) } else { waves(t) });
             let on: Vec<f64> = own.t.iter().map(|t| f64::from(*t < 0.8 * seconds)).collect();
             let mut columns = vec![
                 ("t".to_string(), own.t.as_slice()),

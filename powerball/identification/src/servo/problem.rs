@@ -283,7 +283,8 @@ impl<'l> Problem<'l> {
         let (mut without, mut values, mut free) = (self.clone(), fitted.values.clone(), free.to_vec());
         without.roles.remove(at);
         without.constants.set(Constant::SpeedLimit, f64::INFINITY);
-        (values.remove(at), free.remove(at));
+        values.remove(at);
+        free.remove(at);
         Some((without, values, free))
     }
 

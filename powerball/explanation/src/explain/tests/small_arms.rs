@@ -310,7 +310,7 @@ fn a_body_on_another_link_is_found_there() {
         assert_eq!(explained.effects[0].logs, logs);
         // Learnt on validation logs it has no standard error.
         let std = explained.effects[0].relative_std.first().copied().flatten();
-        assert_eq!(std.is_some(), listed != &[5]);
+        assert_eq!(std.is_some(), *listed != [5]);
         let length = (0..3).map(|k| found["first_moment"][k].as_f64().unwrap().powi(2)).sum::<f64>().sqrt();
         assert!(std.is_none_or(|std| (length - truth.norm()).abs() < 1.96 * std * length), "{found} {std:?}");
         at_the_floor(&explained);
