@@ -153,8 +153,10 @@ impl Solves {
     fn add(&self, running: &mut Running, role: Role, [local, operands]: Errors, p: usize) {
         let b = &self.mobility;
         match role {
-            Role::Pivot(i) => running.eta[p] += b[i] * b[i] * local,
-            Role::Scaled(k, j) => running.eta[p] += 2.0 * b[k] * b[j] * local,
+            Role::Pivot(i) => running.eta[p] += b[i] * b[i] * (local + self.quotients(i, i, p)),
+            Role::Scaled(k, j) => {
+                running.eta[p] += 2.0 * b[k] * b[j] * (local + self.quotients(k, j, p));
+            }
             Role::Lower(k, j) => {
                 running.eta[p] += 2.0 * b[k] * b[j] * (operands + divided(p) * self.scaled(k, j));
             }
@@ -189,6 +191,12 @@ impl Solves {
             }
             Role::Solution(s, i) => self.mobility[i] * (eta * energy + rho(s)) * (1.0 + eta) / (1.0 - eta),
         }
+    }
+
+    /// What the sum for an entry of B misses since each dₖ·Lₖⱼ in it is not quite the one that was divided:
+    /// Σₖ |Lₖᵢ·dₖ·Lₖⱼ| ≤ √(Bᵢᵢ·Bⱼⱼ).
+    fn quotients(&self, i: usize, j: usize, p: usize) -> f64 {
+        divided(p) * (self.diagonal[i] * self.diagonal[j]).sqrt()
     }
 
     /// The largest dₖ·Lₖⱼ.
