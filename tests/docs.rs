@@ -168,6 +168,30 @@ fn doc_comments_are_in_plain_words() {
     assert!(files.len() > 400 && wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// Comments are as wide as rustfmt lets code be: it leaves them alone. Tables and code in them may be wider.
+#[test]
+fn comments_are_at_most_110_columns_wide() {
+    let mut files = Vec::new();
+    for folder in ["powerball", "dyngen", "dyngen-macros", "xtask", "ros2_control", "tests", "benches"] {
+        sources(folder, &mut files);
+    }
+    files.retain(|file| !file.contains("/target/") && !file.contains("/golden/"));
+    let mut wide = Vec::new();
+    for file in &files {
+        let text = std::fs::read_to_string(root().join(file)).unwrap();
+        let mut is_code = false;
+        for (k, line) in text.lines().enumerate() {
+            let Some(words) = line.trim().strip_prefix("//") else { continue };
+            let words = words.trim_start_matches(['/', '!']).trim_start();
+            is_code ^= words.starts_with("```");
+            if line.chars().count() > 110 && !is_code && !words.starts_with('|') {
+                wide.push(format!("{file}:{}", k + 1));
+            }
+        }
+    }
+    assert!(files.len() > 500 && wide.is_empty(), "wider than 110 columns: {}", wide.join(", "));
+}
+
 /// Python's `Rule` is written from the one of Rust: the same fields, words and defaults. With
 /// `POWERBALL_BLESS` set it is written anew.
 #[test]

@@ -1,4 +1,5 @@
-//! The generated code of small arms: the committed bytes of three, and that all compile under the strictest lints.
+//! The generated code of small arms: the committed bytes of three, and that all compile under the strictest
+//! lints.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 

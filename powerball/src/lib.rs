@@ -62,8 +62,8 @@
 //!
 //! # A model in a control step
 //!
-//! [`controller`] has an example with the LWA 4P's model; `powerball generate` writes the same for any arm, with every effect
-//! that was named.
+//! [`controller`] has an example with the LWA 4P's model; `powerball generate` writes the same for any arm,
+//! with every effect that was named.
 #![no_std]
 
 #[cfg(feature = "driver")]

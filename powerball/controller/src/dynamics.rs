@@ -52,7 +52,9 @@ type OfMotion<R, T, const N: usize> = fn(&SVector<T, N>, &SVector<T, N>) -> R;
 /// let arm = Functions::<f64, 6> {
 ///     mass_matrix: |q| minimal::mass_matrix(q, &values()),
 ///     coriolis_times_velocity: |q, dq| minimal::coriolis_times_velocity(q, dq, &values()),
-///     coriolis_transpose_times_velocity: |q, dq| minimal::coriolis_transpose_times_velocity(q, dq, &values()),
+///     coriolis_transpose_times_velocity: |q, dq| {
+///         minimal::coriolis_transpose_times_velocity(q, dq, &values())
+///     },
 ///     gravity: |q| minimal::gravity(q, &values()),
 ///     forward_kinematics: |q| minimal::forward_kinematics(q),
 ///     jacobian: |q| minimal::jacobian(q),

@@ -128,8 +128,8 @@ pub struct Rule {
     /// that is missing often leaves less than [`predicted_share`](Self::predicted_share).
     pub little_share: f64,
 
-    /// Below this time of motion a reader is warned that the folds are too short to tell much, and servos have
-    /// no friction that changes with running time, s.
+    /// Below this time of motion a reader is warned that the folds are too short to tell much, and servos
+    /// have no friction that changes with running time, s.
     pub least_time: f64,
     /// A share of accepted surrogates above this is no chance: the residuals are not what the tests take them
     /// for, and a reader is warned.
