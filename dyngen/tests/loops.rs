@@ -13,7 +13,7 @@ use dyngen::exact::rational::to_f64;
 use dyngen::{Arm, Evaluator, Function, Model, SetKind};
 use rand::{RngExt, SeedableRng};
 use std::ops::{Add, Mul, Neg, Sub};
-use support::{State, evaluate, model, proven};
+use support::{State, evaluate, model, proven, rank};
 
 mod support;
 
@@ -437,29 +437,6 @@ fn the_whole_arm_is_that_of_its_particles() {
             .sum();
         close(&result(Function::KineticEnergy, &s), &[energy], &arm.name);
     }
-}
-
-/// The rank of columns, the longest taken first (Gram and Schmidt, twice).
-fn rank(mut columns: Vec<Vec<f64>>) -> usize {
-    let dot = |u: &[f64], v: &[f64]| u.iter().zip(v).map(|(x, y)| x * y).sum::<f64>();
-    for rank in 0..columns.len() {
-        let longest = (rank..columns.len())
-            .max_by(|i, j| dot(&columns[*i], &columns[*i]).total_cmp(&dot(&columns[*j], &columns[*j])));
-        columns.swap(rank, longest.unwrap());
-        let length = dot(&columns[rank], &columns[rank]).sqrt();
-        if length < 1e-6 {
-            return rank;
-        }
-        columns[rank].iter_mut().for_each(|x| *x /= length);
-        let unit = columns[rank].clone();
-        for other in &mut columns[rank + 1..] {
-            for _ in 0..2 {
-                let part = dot(other, &unit);
-                other.iter_mut().zip(&unit).for_each(|(x, y)| *x -= part * y);
-            }
-        }
-    }
-    columns.len()
 }
 
 #[test]

@@ -8,7 +8,7 @@ use dyngen::dynamics::function::Size;
 use dyngen::exact::rational::to_f64;
 use dyngen::{Arm, Evaluator, Function, Model, SetKind};
 use rand::{RngExt, SeedableRng};
-use support::{State, evaluate, model, proven};
+use support::{State, evaluate, model, proven, rank};
 
 mod support;
 
@@ -115,35 +115,6 @@ fn solved(mut a: Matrix, mut b: Matrix) -> Matrix {
         }
     }
     b
-}
-
-/// The rank of columns, the longest taken first (Gram and Schmidt, twice).
-fn rank(columns: &mut Matrix) -> usize {
-    for column in columns.iter_mut() {
-        let length = dot(column, column).sqrt();
-        // Rotors' columns are longer than others by their ratio's square; what is rounding is no column.
-        let scale = if length > 1e-9 { 1.0 / length } else { 0.0 };
-        column.iter_mut().for_each(|x| *x *= scale);
-    }
-    for rank in 0..columns.len() {
-        let rest = rank..columns.len();
-        let longest =
-            rest.max_by(|i, j| dot(&columns[*i], &columns[*i]).total_cmp(&dot(&columns[*j], &columns[*j])));
-        columns.swap(rank, longest.unwrap());
-        let length = dot(&columns[rank], &columns[rank]).sqrt();
-        if length < 1e-9 {
-            return rank;
-        }
-        columns[rank].iter_mut().for_each(|x| *x /= length);
-        let unit = columns[rank].clone();
-        for other in &mut columns[rank + 1..] {
-            for _ in 0..2 {
-                let part = dot(other, &unit);
-                other.iter_mut().zip(&unit).for_each(|(x, y)| *x -= part * y);
-            }
-        }
-    }
-    columns.len()
 }
 
 /// G and o of an arm, from its joints alone.
@@ -288,7 +259,7 @@ fn the_rank_is_that_of_the_columns_in_numbers() {
             let out = evaluate(&regressor, &whole.samples(&[]));
             rows.extend(times(&transpose(&g), &out.chunks(p).map(<[f64]>::to_vec).collect()));
         }
-        let found = rank(&mut transpose(&rows));
+        let found = rank(transpose(&rows));
         assert_eq!(tied.set(SetKind::Minimal).unwrap().parameters.len(), found, "{text}");
     }
 }

@@ -20,6 +20,36 @@ pub(crate) fn proven(model: &Model, kind: SetKind) -> Vec<Evaluator> {
     model.functions(kind).map(evaluator).collect()
 }
 
+/// The rank of columns, the longest taken first (Gram and Schmidt, twice).
+pub(crate) fn rank(mut columns: Vec<Vec<f64>>) -> usize {
+    let dot = |u: &[f64], v: &[f64]| u.iter().zip(v).map(|(x, y)| x * y).sum::<f64>();
+    for column in &mut columns {
+        let length = dot(column, column).sqrt();
+        // Rotors' columns are longer than others by their ratio's square; what is rounding is no column.
+        let scale = if length > 1e-9 { 1.0 / length } else { 0.0 };
+        column.iter_mut().for_each(|x| *x *= scale);
+    }
+    for rank in 0..columns.len() {
+        let rest = rank..columns.len();
+        let longest =
+            rest.max_by(|i, j| dot(&columns[*i], &columns[*i]).total_cmp(&dot(&columns[*j], &columns[*j])));
+        columns.swap(rank, longest.unwrap());
+        let length = dot(&columns[rank], &columns[rank]).sqrt();
+        if length < 1e-9 {
+            return rank;
+        }
+        columns[rank].iter_mut().for_each(|x| *x /= length);
+        let unit = columns[rank].clone();
+        for other in &mut columns[rank + 1..] {
+            for _ in 0..2 {
+                let part = dot(other, &unit);
+                other.iter_mut().zip(&unit).for_each(|(x, y)| *x -= part * y);
+            }
+        }
+    }
+    columns.len()
+}
+
 /// One sample of everything that functions take but parameters.
 #[derive(Clone)]
 pub(crate) struct State {

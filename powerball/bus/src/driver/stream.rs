@@ -16,7 +16,7 @@ pub(super) struct Stream {
     /// Some were taken that have not left.
     pending: bool,
     /// They ever came.
-    begun: bool,
+    started: bool,
     /// Cycles in a row with rejected ones, and without any.
     rejected: u8,
     starved: u8,
@@ -32,7 +32,7 @@ impl Stream {
         let checked = check(arm, setpoints);
         self.rejection = checked.err().or(self.rejection);
         if checked.is_ok() {
-            (self.fresh, self.pending, self.begun) = (true, true, true);
+            (self.fresh, self.pending, self.started) = (true, true, true);
             for (joint, value) in arm.joints.iter_mut().zip(setpoints) {
                 joint.target = *value;
             }
@@ -66,7 +66,7 @@ impl Stream {
     /// Where that takes more torque than a joint has.
     pub(super) fn leave<const N: usize>(&mut self, arm: &mut Arm<N>) -> Result<(), Rejection> {
         let came = core::mem::take(&mut self.pending);
-        if came || !self.begun || arm.control != ControlMode::InterpolatedPosition {
+        if came || !self.started || arm.control != ControlMode::InterpolatedPosition {
             return Ok(());
         }
         let period = arm.profile.period_seconds();
@@ -93,7 +93,7 @@ impl Stream {
             arm.counters.rejected += 1;
             self.rejected = self.rejected.saturating_add(1);
             return (self.rejected >= reactions.rejected_limit).then_some(Cause::Setpoints(rejection));
-        } else if self.begun && arm.control != ControlMode::ProfilePosition {
+        } else if self.started && arm.control != ControlMode::ProfilePosition {
             arm.counters.starved += 1;
             self.starved = self.starved.saturating_add(1);
             let limit = reactions.starved_cycles;
