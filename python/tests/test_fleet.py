@@ -156,6 +156,8 @@ def test_a_log_is_computed_once(small, uninterrupted, client, tmp_path):
 
     again = fleet.update(client, job, [str(logs)])
     assert again.known == 13 and not again.outcomes
+    # Nothing is left of what the workers of a finished run read.
+    assert not _files.names(f"{job.store}/known", ".txt")
     # Nor as a copy under another name; with another arm file or map it is another one.
     copy = tmp_path / "unit-09"
     copy.mkdir()

@@ -9,6 +9,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import dask.distributed as dd
 
+from . import _files
 from ._fit import FAST, SLOW, Extra, Fit, Speeds, Variation
 from ._logs import find
 from ._past import Past, past_of
@@ -68,11 +69,10 @@ def update(client: dd.Client, job: Job, logs: Sequence[str], retry: bool = False
     todo = [one for one in found if (one.log, one.size, one.stamp) not in done]
 
     start = time.perf_counter()
-    # By a name of its own. Two calls with the same keys would share a name that is made from the content, and
-    # what the first one releases late would be lost for the second one (dask/distributed#3703).
-    (shared,) = client.scatter([frozenset(known)], broadcast=True, hash=False)
+    # Every worker reads this file once. Dask's `scatter` can lose what it shares (dask/distributed#3703).
+    known_file = store.write_known(known)
     # A worker that dies takes its logs to another one; a log that kills every worker is given up.
-    futures = {client.submit(reduce_log, job, one, shared, pure=False, retries=1): one for one in todo}
+    futures = {client.submit(reduce_log, job, one, known_file, pure=False, retries=1): one for one in todo}
     outcomes = []
     for future in dd.as_completed(futures):
         if future.status == "finished":
@@ -82,6 +82,7 @@ def update(client: dd.Client, job: Job, logs: Sequence[str], retry: bool = False
             store.add(row)
             outcomes.append(Outcome(row["log"], row["key"], "failed", 0.0, row["size"], 0, "none"))
         future.release()
+    _files.remove(known_file)
     store.compact()
     again = sum(outcome.verdict == "known" for outcome in outcomes)
     new = [outcome for outcome in outcomes if outcome.verdict != "known"]

@@ -3,12 +3,15 @@
 DIR/parts/KEY.parquet        one row, as soon as a log is done
 DIR/logs/NAME.parquet        rows of finished runs
 DIR/summaries/KEY.summary    a log, or several, as `powerball summarize` writes them
+DIR/known/NAME.txt           keys of logs that the present run need not compute again
 """
 
 from __future__ import annotations
 
+import functools
 import io
-from typing import Any, Dict, Iterable, List, Optional, Set
+import uuid
+from typing import Any, Dict, FrozenSet, Iterable, List, Optional, Set
 
 import pyarrow as pa
 import pyarrow.parquet as parquet
@@ -91,6 +94,12 @@ class Store:
             if file != name:
                 _files.remove(f"{self.url}/{file}")
 
+    def write_known(self, keys: Iterable[str]) -> str:
+        """Writes the keys that workers of one run need not compute again; gives the file."""
+        file = f"{self.url}/known/{uuid.uuid4().hex}.txt"
+        _files.write(file, "\n".join(sorted(keys)).encode())
+        return file
+
     def summary(self, key: str) -> str:
         """The file of a summary."""
         return f"{self.url}/summaries/{key}.summary"
@@ -111,6 +120,12 @@ class Store:
 def known_keys(rows: Iterable[Row], retry: bool) -> Set[str]:
     """The keys of what is done; with ``retry`` what failed is not."""
     return {row["key"] for row in rows if not (retry and row["verdict"] == "failed")}
+
+
+@functools.lru_cache(maxsize=4)
+def read_known(file: str) -> FrozenSet[str]:
+    """The keys that ``Store.write_known`` wrote, read once in each process."""
+    return frozenset(_files.read(file).decode().split())
 
 
 def table_of(rows: List[Row], schema: pa.Schema) -> bytes:

@@ -9,7 +9,7 @@ import os
 import tempfile
 import time
 from dataclasses import dataclass, field
-from typing import Any, Dict, FrozenSet, Optional, Sequence
+from typing import Any, Dict, Optional, Sequence
 
 import fsspec
 
@@ -20,7 +20,7 @@ from ..summary import Summary, summarize
 from . import _files
 from ._fit import Fit
 from ._logs import Found, Rule, date_of, unit_of
-from ._store import SCHEMA, Row, Store
+from ._store import SCHEMA, Row, Store, read_known
 
 #: Summaries that are in memory together: each has three megabytes at most.
 AT_ONCE = 32
@@ -68,8 +68,11 @@ def arm_of(text: str) -> Arm:
     return Arm.from_toml(text)
 
 
-def reduce_log(job: Job, found: Found, known: FrozenSet[str], worker: Optional[str] = None) -> Outcome:
-    """One log into the store: its fit and its summary, or why there is none."""
+def reduce_log(job: Job, found: Found, known_file: str) -> Outcome:
+    """One log into the store: its fit and its summary, or why there is none.
+
+    ``known_file``: the keys of logs that need not be computed again, as ``Store.write_known`` writes them.
+    """
     start, store, size = time.perf_counter(), Store(job.store), 0
     row: Row = {name: None for name in SCHEMA.names}
     row.update(setup=job.setup, log=found.log, size=found.size, stamp=found.stamp, date=found.written)
@@ -82,8 +85,8 @@ def reduce_log(job: Job, found: Found, known: FrozenSet[str], worker: Optional[s
                 fs.get_file(name, here)
             row["hash"] = _hash(here)
             row["key"] = _files.key_of(job.setup, row["hash"])
-            if row["key"] in known:
-                return _outcome(row, "known", start, 0, worker)
+            if row["key"] in read_known(known_file):
+                return _outcome(row, "known", start, 0)
             row["unit"] = unit_of(job.rule, found.log, here)
             row["date"] = date_of(job.rule, found, here)
             summary = summarize(arm_of(job.arm), here, map=list(job.map) or None)
@@ -98,7 +101,7 @@ def reduce_log(job: Job, found: Found, known: FrozenSet[str], worker: Optional[s
         row.update(verdict="failed", reasons=[str(why)])
     row["key"] = row["key"] or unread(job, found)
     store.add(row)
-    return _outcome(row, row["verdict"], start, size, worker)
+    return _outcome(row, row["verdict"], start, size)
 
 
 def failed_row(job: Job, found: Found, why: str) -> Row:
@@ -171,9 +174,9 @@ def _hash(file: str) -> str:
     return digest.hexdigest()
 
 
-def _outcome(row: Dict[str, Any], verdict: str, start: float, size: int, worker: Optional[str]) -> Outcome:
+def _outcome(row: Dict[str, Any], verdict: str, start: float, size: int) -> Outcome:
     seconds = time.perf_counter() - start
-    return Outcome(row["log"], row["key"], verdict, seconds, row["size"], size, worker or _worker())
+    return Outcome(row["log"], row["key"], verdict, seconds, row["size"], size, _worker())
 
 
 def _worker() -> str:
