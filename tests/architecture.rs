@@ -238,7 +238,7 @@ fn against_the_table(crate_source: &str, folder: &str) -> BTreeSet<String> {
                 (path[0] == folder).then(|| order.iter().position(|other| path.get(1) == Some(other)));
             if let Some(there) = there.flatten().filter(|there| *there > here) {
                 wrong.insert(format!("{} uses {}, which stands below it", own.join("/"), order[there]));
-            } else if there == Some(None) && path.len() == 2 {
+            } else if there == Some(None) {
                 wrong.insert(format!("{} uses {} of mod.rs: name its file", own.join("/"), path[1]));
             }
         }

@@ -290,8 +290,8 @@ fn main_in_rust(case: &Case, model: &Model) -> String {
         );
     }
     format!(
-        "mod {name} {{ include!(\"{name}.inc\"); }}\nfn run_{name}<T: Real>(mut next: Input) {{\n    while \
-        !next.0.is_empty() {{\n{body}    }}\n}}\n"
+        "mod {name} {{ include!(\"{name}.inc\"); }}\nfn run_{name}<T: Real>(mut next: Input) {{\n    \
+        while !next.0.is_empty() {{\n{body}    }}\n}}\n"
     )
 }
 
@@ -375,9 +375,8 @@ fn compile(compiler: &str, arguments: &[&str], files: &[PathBuf]) {
 
 /// The program in Rust with all arms.
 fn built_rust(cases: &[(Case, Model)]) -> PathBuf {
-    let manifest = "[package]\nname = \"c_language\"\nversion = \"0.0.0\"\nedition = \
-        \"2024\"\n[workspace]\n[dependencies]\n\
-                    nalgebra = { version = \"0.35\", default-features = false, features = [\"libm\"] }\n";
+    let manifest = "[package]\nname = \"c_language\"\nversion = \"0.0.0\"\nedition = \"2024\"\n[workspace]\n\
+        [dependencies]\nnalgebra = { version = \"0.35\", default-features = false, features = [\"libm\"] }\n";
     file("Cargo.toml", manifest);
     // No processor is asked for one here: it is a function of libm.
     file("build.rs", "fn main() { println!(\"cargo::rustc-cfg=dyngen_fma\"); }\n");

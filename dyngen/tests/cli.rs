@@ -519,9 +519,8 @@ fn pipes_and_devices_are_refused() {
 fn what_no_arm_can_have_is_said() {
     let rod = |a: &str, gravity: &str| {
         format!(
-            "name = \"rod\"\nconvention = \"standard\"\ngravity = [0, {gravity}, 0]\n[[joint]]\nkind = \
-            \"revolute\"\n\
-             a = {a}\nalpha = 0\nd = 0\ntheta = 0\n"
+            "name = \"rod\"\nconvention = \"standard\"\ngravity = [0, {gravity}, 0]\n[[joint]]\n\
+            kind = \"revolute\"\na = {a}\nalpha = 0\nd = 0\ntheta = 0\n"
         )
     };
     let arm = file("rod.toml", &rod("0.5", "-9.81"));

@@ -294,9 +294,8 @@ fn compared(arm: &str, text: &str, mutants: &[Mutant]) -> Result<(), String> {
     let name = Path::new(arm).file_stem().unwrap().to_string_lossy().into_owned();
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("mutants_{}_{name}", mutants.len()));
     std::fs::create_dir_all(folder.join("src")).unwrap();
-    let manifest = "[package]\nname = \"mutants\"\nversion = \"0.0.0\"\nedition = \
-        \"2024\"\n[workspace]\n[dependencies]\n\
-                    nalgebra = { version = \"0.35\", default-features = false, features = [\"libm\"] }\n";
+    let manifest = "[package]\nname = \"mutants\"\nversion = \"0.0.0\"\nedition = \"2024\"\n[workspace]\n\
+        [dependencies]\nnalgebra = { version = \"0.35\", default-features = false, features = [\"libm\"] }\n";
     std::fs::write(folder.join("Cargo.toml"), manifest).unwrap();
     std::fs::copy(root().join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
     let mut program = PROGRAM.to_string();

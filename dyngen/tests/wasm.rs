@@ -102,10 +102,9 @@ fn torques_in_node_are_the_evaluator_s() {
 
 /// The module of the crate in a folder, whose function takes `numbers` numbers.
 fn built(folder: &Path, workspace: &Path, numbers: usize) -> std::path::PathBuf {
-    let manifest = "[package]\nname = \"wasm\"\nversion = \"0.0.0\"\nedition = \
-        \"2024\"\n[workspace]\n[lib]\ncrate-type = [\"cdylib\"]\n\
-                    [dependencies]\nnalgebra = { version = \"0.35\", default-features = false, features = \
-                    [\"libm\"] }\n";
+    let manifest = "[package]\nname = \"wasm\"\nversion = \"0.0.0\"\nedition = \"2024\"\n[workspace]\n[lib]\n\
+        crate-type = [\"cdylib\"]\n[dependencies]\n\
+        nalgebra = { version = \"0.35\", default-features = false, features = [\"libm\"] }\n";
     std::fs::write(folder.join("Cargo.toml"), manifest).unwrap();
     // The versions of this workspace, so that nothing has to be looked up.
     std::fs::copy(workspace.join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();

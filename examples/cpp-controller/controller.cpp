@@ -35,7 +35,7 @@ int main() {
 
   arm = SimulatedArm(bent);
   my_arm_model model;
-  my_arm_begin(&model);
+  my_arm_start(&model);
   double worst = 0;
   for (int k = 0; k < 800; ++k) {
     Joints q = bent, dq, ddq;

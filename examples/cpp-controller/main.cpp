@@ -20,7 +20,7 @@ using Vector = std::array<my_arm_real, JOINTS>;
 class TorqueModel {
 public:
   TorqueModel() { restart(); }
-  void restart() { my_arm_begin(&model_); }
+  void restart() { my_arm_start(&model_); }
   bool torque(const Vector &q, const Vector &dq, const Vector &ddq, my_arm_real running, Vector &out) {
     return my_arm_torque(&model_, q.data(), dq.data(), ddq.data(), running, nullptr, out.data()) == MY_ARM_OK;
   }
@@ -44,12 +44,12 @@ int fail(const char *what) {
 
 int main() {
   // Wrong use is reported.
-  my_arm_model never_begun = {};
+  my_arm_model never_started = {};
   Vector zero{}, torque{};
-  if (my_arm_torque(&never_begun, zero.data(), zero.data(), zero.data(), 0, nullptr, torque.data()) != MY_ARM_NOT_BEGUN) {
+  if (my_arm_torque(&never_started, zero.data(), zero.data(), zero.data(), 0, nullptr, torque.data()) != MY_ARM_NOT_STARTED) {
     return fail("a model without begin gives torques");
   }
-  if (my_arm_begin(nullptr) != MY_ARM_NULL) {
+  if (my_arm_start(nullptr) != MY_ARM_NULL) {
     return fail("null is taken for a model");
   }
 

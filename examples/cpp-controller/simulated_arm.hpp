@@ -19,7 +19,7 @@ struct SimulatedArm {
   double time = 0.0;
   my_arm_model model;
 
-  explicit SimulatedArm(const Joints &from) : q(from) { my_arm_begin(&model); }
+  explicit SimulatedArm(const Joints &from) : q(from) { my_arm_start(&model); }
 
   // A cycle later.
   void advance() {

@@ -9,9 +9,8 @@ use std::process::{Command, Output};
 /// A pendulum of 1 kg at 0.5 m, whose lengths are in a unit and gravity in another.
 fn arm(a: &str, gravity: &str) -> String {
     format!(
-        "name = \"pendulum\"\nconvention = \"standard\"\ngravity = [0, -{gravity}, 0]\n[[joint]]\nkind = \
-        \"revolute\"\n\
-         a = {a}\nalpha = 0\nd = 0\ntheta = 0\n"
+        "name = \"pendulum\"\nconvention = \"standard\"\ngravity = [0, -{gravity}, 0]\n[[joint]]\n\
+        kind = \"revolute\"\na = {a}\nalpha = 0\nd = 0\ntheta = 0\n"
     )
 }
 

@@ -139,8 +139,8 @@ fn arm_text() -> String {
     let joint = "{ kind = \"revolute\", a = 0.3, alpha = \"pi/2\", d = 0.1, theta = 0, position = [-1, 1], \
                  velocity = 1, acceleration = 1, torque = 1 }";
     format!(
-        "name = \"two\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\njoint = \
-        [\n{joint},\n{joint},\n]\n"
+        "name = \"two\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\njoint = [\n{joint},\n{joint},\n\
+        ]\n"
     )
 }
 

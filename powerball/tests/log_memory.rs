@@ -20,8 +20,8 @@ fn arm() -> dyngen::Arm {
     let joint = |k| {
         let turn = if k % 2 == 0 { "pi/2" } else { "-pi/2" };
         format!(
-            "[[joint]]\nkind = \"revolute\"\nname = \"arm_joint_{}\"\na = 0.3\nalpha = \"{turn}\"\nd = \
-            0.1\ntheta = 0\n",
+            "[[joint]]\nkind = \"revolute\"\nname = \"arm_joint_{}\"\na = 0.3\nalpha = \"{turn}\"\nd = 0.1\n\
+            theta = 0\n",
             k + 1
         )
     };

@@ -10,7 +10,7 @@ public:
   MyArmController()
   : TorqueController(
       {MY_ARM_JOINTS, my_arm_mass_matrix, my_arm_coriolis_times_velocity, my_arm_coriolis_transpose_times_velocity,
-       my_arm_gravity, sizeof(my_arm_model), [](void * model) { return my_arm_begin(static_cast<my_arm_model *>(model)); },
+       my_arm_gravity, sizeof(my_arm_model), [](void * model) { return my_arm_start(static_cast<my_arm_model *>(model)); },
        [](void * model, const double * q, const double * dq, const double * ddq, double running,
           const double * temperature, double * torque) {
          return my_arm_torque(static_cast<my_arm_model *>(model), q, dq, ddq, running, temperature, torque);

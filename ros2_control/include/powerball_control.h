@@ -29,7 +29,7 @@ typedef struct powerball_arm_model {
   int (*coriolis_transpose_times_velocity)(const double *q, const double *dq, double *result);
   /* g, N m. */
   int (*gravity)(const double *q, double *result);
-  /* The whole torque with friction and effects, my_arm_begin and my_arm_torque: all three, or 0 and null for a rigid arm. A
+  /* The whole torque with friction and effects, my_arm_start and my_arm_torque: all three, or 0 and null for a rigid arm. A
    * control holds such models of its own, of model_size = sizeof(my_arm_model) bytes. */
   size_t model_size;
   int (*begin)(void *model);

@@ -18,9 +18,8 @@ pub(crate) const GAINS: [u32; 3] = [8, 16, 32];
 /// A pendulum of one link of a length, m, that hangs at q = 0.
 pub(crate) fn pendulum(length: f64, servo: &str) -> Arm {
     let text = format!(
-        "name = \"pendulum\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n[[joint]]\nkind = \
-        \"revolute\"\n\
-         a = {length}\nalpha = 0\nd = 0\ntheta = \"-pi/2\"\n[joint.servo]\n{servo}"
+        "name = \"pendulum\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n[[joint]]\n\
+        kind = \"revolute\"\na = {length}\nalpha = 0\nd = 0\ntheta = \"-pi/2\"\n[joint.servo]\n{servo}"
     );
     Arm::parse(&text, "pendulum.toml").unwrap()
 }

@@ -105,13 +105,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let figures = arguments.write.with_file_name("..").join("figures");
     fs::create_dir_all(&figures).map_err(|e| format!("{}: {e}", figures.display()))?;
     let mut page = String::from(
-        "# Measured logs, case by case\n\nEvery case is one run of `powerball explain`; the page is made, \
-            figures and all, by\n\n```sh\ncargo run --release -p xtask -- stories\n```\n\n\
+        "# Measured logs, case by case\n\n\
+         Every case is one run of `powerball explain`; the page is made, figures and all, by\n\n```sh\n\
+         cargo run --release -p xtask -- stories\n```\n\n\
          Figures show means over equal numbers of samples (purple without the effect but with all others, \
-         blue with it, orange what it adds), torques \
-         against the direction of motion where that is stated. [measured.md](../measured.md) has the results \
-         in short and describes the data, [explain.md](../explain.md) says what must be true \
-         before a name is given, and \
+         blue with it, orange what it adds), torques against the direction of motion where that is stated. \
+         [measured.md](../measured.md) has the results in short and describes the data, \
+         [explain.md](../explain.md) says what must be true before a name is given, and \
          [study.md](../study.md) how often a name is right where the truth is known.\n",
     );
     for case in cases() {

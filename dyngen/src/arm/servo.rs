@@ -121,9 +121,8 @@ fn number(r: &mut Reader<'_>, v: &Value<'_>, quantity: &str, unit: &str, range: 
 mod tests {
     use crate::Arm;
 
-    const JOINT: &str = "name = \"one\"\nconvention = \"standard\"\ngravity = [0, -9.81, \
-        0]\n[[joint]]\nkind = \"revolute\"\n\
-                         a = 0.1\nalpha = 0\nd = 0\ntheta = 0\n";
+    const JOINT: &str = "name = \"one\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n[[joint]]\n\
+        kind = \"revolute\"\na = 0.1\nalpha = 0\nd = 0\ntheta = 0\n";
 
     #[test]
     fn what_is_known_of_a_servo_is_read_and_the_rest_is_unknown() {

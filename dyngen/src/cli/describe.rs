@@ -222,8 +222,9 @@ fn weak_sums(t: &mut String, weak: &[Weak]) {
     }
     let _ = writeln!(
         t,
-        "\nhardly identifiable, through residues of the file's numbers alone (an angle such as 1.5708, or \
-         axes that almost\nmeet), with the singular value of the scaled regressor:"
+        "\n\
+         hardly identifiable, through residues of the file's numbers alone (an angle such as 1.5708, or axes \
+         that almost\nmeet), with the singular value of the scaled regressor:"
     );
     for w in weak {
         let _ = writeln!(t, "  {:.1e}: sums of {}", w.singular_value, w.parameters.join(" "));
@@ -258,8 +259,9 @@ fn operation_table(t: &mut String, operations: &[(&'static str, Operations)]) {
 fn rounding_table(t: &mut String, arm: &Arm, rounding: &Rounding) {
     let _ = writeln!(
         t,
-        "\nrounding: |emitted − exact| of each function's worst entry, in its unit, for every state within \
-         the limits\n({}parameters: {}):",
+        "\n\
+         rounding: |emitted − exact| of each function's worst entry, in its unit, for every state within the \
+         limits\n({}parameters: {}):",
         if rounding.contracted { "code with --contract; " } else { "" },
         rounding.parameters.text()
     );

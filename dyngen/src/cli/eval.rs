@@ -8,10 +8,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
-#[command(
-    after_help = format!("{}\n\nExample: dyngen eval arm.toml --function inverse_dynamics --states \
-        states.csv --values values.json", generate::list_of_functions())
-)]
+#[command(after_help = format!("{}\n\n\
+    Example: dyngen eval arm.toml --function inverse_dynamics --states states.csv --values values.json",
+    generate::list_of_functions()))]
 pub(super) struct Args {
     /// The arm file.
     arm: PathBuf,

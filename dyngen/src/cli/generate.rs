@@ -6,10 +6,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
-#[command(after_help = format!("{}\n\nExample: dyngen generate arm.toml -o arm.rs --parameters minimal \
-        --functions regressor,mass_matrix\n         dyngen generate arm.toml --language c -o arm.c\n         \
-        dyngen generate arm.toml --language cuda -o arm.cu\n         dyngen generate arm.toml --batch \
-        --contract -o arm.rs", list_of_functions()))]
+#[command(after_help = format!("{}\n\n\
+        Example: dyngen generate arm.toml -o arm.rs --parameters minimal --functions \
+        regressor,mass_matrix\n         dyngen generate arm.toml --language c -o arm.c\n         \
+        dyngen generate arm.toml --language cuda -o arm.cu\n         \
+        dyngen generate arm.toml --batch --contract -o arm.rs", list_of_functions()))]
 pub(super) struct Args {
     /// The arm file.
     arm: PathBuf,

@@ -253,12 +253,12 @@ extern \"C\" {{
 #define {guard}_JOINTS {joints}
 typedef {real} {prefix}_real;
 
-/* What every function gives: done; a pointer is null; the model was not begun. In the last two cases \
+/* What every function gives: done; a pointer is null; the model was not started. In the last two cases \
 nothing was
  * written. */
 #define {guard}_OK 0
 #define {guard}_NULL 1
-#define {guard}_NOT_BEGUN 2
+#define {guard}_NOT_STARTED 2
 
 {first}{functions}#ifdef __cplusplus
 }}

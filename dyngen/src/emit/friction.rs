@@ -189,8 +189,8 @@ pub(super) fn columns_doc(terms: &[FrictionTerm], is_coupled: bool) -> String {
     };
     let list: String = terms.iter().enumerate().map(|(k, term)| format!("\n{}. `{term}`", k + 1)).collect();
     format!(
-        "{title}, one for each column:\n{list}\n\n* `dq`: joint velocities, rad/s\n\nReturns n × terms: \
-        {rows}"
+        "{title}, one for each column:\n{list}\n\n* `dq`: joint velocities, rad/s\n\n\
+        Returns n × terms: {rows}"
     )
 }
 
@@ -210,8 +210,9 @@ fn column(term: &FrictionTerm, velocities: &[Ident]) -> TokenStream {
 
 /// What the function of the joints' friction torques is.
 pub(super) const FRICTION_DOC: &str = "Friction torques of all joints: each row of [`friction_columns`] \
-     times the same row of\ncoefficients.\n\n* `dq`: joint velocities, rad/s\n* `coefficients`: n × terms, \
-     N·m (N·m·s/rad where viscous)\n\nReturns the torques, N·m, that the drives spend on friction.";
+     times the same row of\ncoefficients.\n\n* `dq`: joint velocities, rad/s\n\
+     * `coefficients`: n × terms, N·m (N·m·s/rad where viscous)\n\n\
+     Returns the torques, N·m, that the drives spend on friction.";
 
 /// The function of the joints' friction torques, N·m; with coupled motors Mᵀ times theirs.
 fn friction_function(n: usize, coupled: Option<&[Vec<f64>]>) -> TokenStream {

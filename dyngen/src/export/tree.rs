@@ -149,14 +149,11 @@ pub(super) mod tests {
     /// Two revolute joints and a prismatic one, in either convention, with frames, base and tool.
     pub(crate) fn arm(convention: &str) -> Arm {
         let text = format!(
-            "name = \"three\"\nconvention = \"{convention}\"\ngravity = [0.0, 0.0, -9.81]\n\
-             [base]\nxyz = [0.1, 0.2, 0.3]\nrpy = [\"pi/2\", 0, 0.3]\n\
-             [[joint]]\nkind = \"revolute\"\na = 0.3\nalpha = \"pi/2\"\nd = 0.1\ntheta = 0.4\nname = \
-             \"shoulder\"\n\
-             rotor_ratio = 100\nposition = [-2.5, 2.0]\nvelocity = 3.0\ntorque = 50.0\n\
-             [[joint]]\nkind = \"prismatic\"\na = 0.05\nalpha = -0.7\nd = 0.2\ntheta = \"pi/3\"\nname = \
-             \"slide\"\n\
-             position = [0.0, 0.4]\n\
+            "name = \"three\"\nconvention = \"{convention}\"\ngravity = [0.0, 0.0, -9.81]\n[base]\n\
+             xyz = [0.1, 0.2, 0.3]\nrpy = [\"pi/2\", 0, 0.3]\n[[joint]]\nkind = \"revolute\"\na = 0.3\n\
+             alpha = \"pi/2\"\nd = 0.1\ntheta = 0.4\nname = \"shoulder\"\nrotor_ratio = 100\n\
+             position = [-2.5, 2.0]\nvelocity = 3.0\ntorque = 50.0\n[[joint]]\nkind = \"prismatic\"\n\
+             a = 0.05\nalpha = -0.7\nd = 0.2\ntheta = \"pi/3\"\nname = \"slide\"\nposition = [0.0, 0.4]\n\
              [[joint]]\nkind = \"revolute\"\na = 0.2\nalpha = 0.9\nd = -0.1\ntheta = 0\nname = \"wrist\"\n\
              [tool]\nxyz = [0, 0, 0.1]\nrpy = [0, 0, 0]\n"
         );

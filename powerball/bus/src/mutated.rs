@@ -110,12 +110,11 @@ fn a_driver_that_hears_nonsense_moves_nothing() {
 /// A small DCF with its bytes changed, lost and doubled: a profile or a reason.
 #[test]
 fn mutated_files_of_drives_are_read_or_refused() {
-    const DCF: &str = "[DeviceInfo]\nBaudRate_500=1\n[1016sub1]\nDataType=7\nAccessType=rw\n[6040]\nDataType=6\n\
-        AccessType=rww\nPDOMapping=1\n[1400sub1]\nDataType=7\nAccessType=rw\nDefaultValue=$NODEID+0x200\n[1003]\n\
-        ObjectType=8\nDataType=0x1B\nCompactSubObj=3\n[1003Name]\nNrOfEntries=1\n1=Newest ; of \
-        all\n[1003Value]\n\
-        2=0x8130\n[A0sub1]\nDataType=5\nDefaultValue=0x10\n[2000]\nDataType=0xA0\nDefaultValue=0xFFFFFF\n\
-        [DeviceComissioning]\nNodeID=5\nBaudrate=500\n";
+    const DCF: &str = "[DeviceInfo]\nBaudRate_500=1\n[1016sub1]\nDataType=7\nAccessType=rw\n[6040]\n\
+        DataType=6\nAccessType=rww\nPDOMapping=1\n[1400sub1]\nDataType=7\nAccessType=rw\n\
+        DefaultValue=$NODEID+0x200\n[1003]\nObjectType=8\nDataType=0x1B\nCompactSubObj=3\n[1003Name]\n\
+        NrOfEntries=1\n1=Newest ; of all\n[1003Value]\n2=0x8130\n[A0sub1]\nDataType=5\nDefaultValue=0x10\n\
+        [2000]\nDataType=0xA0\nDefaultValue=0xFFFFFF\n[DeviceComissioning]\nNodeID=5\nBaudrate=500\n";
     const ARM: &str = include_str!("../../lwa4p_bus.toml");
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     for _ in 0..2_000 {

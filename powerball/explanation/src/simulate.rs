@@ -306,9 +306,8 @@ mod tests {
     use super::*;
 
     /// A pendulum of 2 kg at 0.5 m, in a plane with gravity along −y.
-    const ARM: &str = "name = \"pendulum\"\nconvention = \"standard\"\ngravity = [0, -9.81, \
-        0]\n[[joint]]\nkind = \"revolute\"\n\
-        a = 0.5\nalpha = 0\nd = 0\ntheta = 0\n";
+    const ARM: &str = "name = \"pendulum\"\nconvention = \"standard\"\ngravity = [0, -9.81, 0]\n[[joint]]\n\
+        kind = \"revolute\"\na = 0.5\nalpha = 0\nd = 0\ntheta = 0\n";
     const INERTIA: f64 = 0.5;
     const WEIGHT: f64 = 9.81;
 

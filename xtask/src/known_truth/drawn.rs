@@ -92,9 +92,10 @@ pub(super) fn write(page: &mut String, data: &Path, draws: u64, pairs: u64) -> R
         );
     }
     page.push_str(
-        "\n## What a draw put in\n\nOf two clean logs one is fitted and the other one judges; into \
-        one of them a seeded draw puts something. Named: the log's entry says it. Else: an entry says \
-        something else as well or instead.\n\n| put in | asked | named | else |\n|---|---|---|---|\n",
+        "\n## What a draw put in\n\n\
+        Of two clean logs one is fitted and the other one judges; into one of them a seeded draw puts \
+        something. Named: the log's entry says it. Else: an entry says something else as well or instead.\n\n\
+        | put in | asked | named | else |\n|---|---|---|---|\n",
     );
     for (kind, score) in KINDS.iter().zip(&scores) {
         let Score { asked, named, false_names } = score;
@@ -115,8 +116,8 @@ pub(super) fn write(page: &mut String, data: &Path, draws: u64, pairs: u64) -> R
     }
     let _ = writeln!(
         page,
-        "\n## Clean pairs\n\nThe first half of a clean log against its second one, {pairs} pairs: {} logs \
-        are reported to differ.",
+        "\n## Clean pairs\n\n\
+        The first half of a clean log against its second one, {pairs} pairs: {} logs are reported to differ.",
         different.len()
     );
     for sentence in different {

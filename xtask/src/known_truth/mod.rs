@@ -37,7 +37,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let Arguments { draws, pairs, .. } = arguments;
     let _ = write!(
         page,
-        "\nMade by `cargo run --release -p xtask -- known-truth --draws {draws} --pairs {pairs}`; draws are \
+        "\n\
+        Made by `cargo run --release -p xtask -- known-truth --draws {draws} --pairs {pairs}`; draws are \
         seeded by their number.\n"
     );
     if let Some(folder) = arguments.write.parent() {

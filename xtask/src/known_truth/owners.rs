@@ -21,9 +21,9 @@ const QUESTIONS: &str = include_str!("questions.csv");
 
 pub(super) fn write(page: &mut String, data: &Path) -> Result<(), String> {
     page.push_str(
-        "## What others put in\n\n| logs: fitted; for validation | truth of their owners | which logs \
-        differ, and by what | other names | before → after, % | textbook, % | PySINDy, % (terms) \
-        |\n|---|---|---|---|---|---|---|\n",
+        "## What others put in\n\n\
+        | logs: fitted; for validation | truth of their owners | which logs differ, and by what | other \
+        names | before → after, % | textbook, % | PySINDy, % (terms) |\n|---|---|---|---|---|---|---|\n",
     );
     let sparse = Sparse::read()?;
     for question in csv::Reader::from_reader(QUESTIONS.as_bytes()).deserialize() {

@@ -100,7 +100,8 @@ fn curve(fit: &[Case], judge: &[Case]) -> String {
     out.push_str(&reliability(judge, &curve));
     let _ = writeln!(
         out,
-        "\nBrier score on the {} names that were not fitted: {:.4}; of the curve in use {:.4}; of three \
+        "\n\
+         Brier score on the {} names that were not fitted: {:.4}; of the curve in use {:.4}; of three \
          constants {:.4}; of one, the share of the other half, {:.4}",
         judge.len(),
         brier(judge, &curve),

@@ -178,9 +178,8 @@ pub(super) fn prepare(names: &Names, model: &Model, preparation: &Preparation) -
     }
     let operations = preparation.operations();
     let doc = format!(
-        "What the functions need of the parameters alone: for those that end in `_with`.\n\n* `parameters`: \
-        {}\n\n\
-         Operations: {} multiplications, {} additions.",
+        "What the functions need of the parameters alone: for those that end in `_with`.\n\n\
+        * `parameters`: {}\n\nOperations: {} multiplications, {} additions.",
         names.words(Argument::Parameters.meaning()),
         operations.mul,
         operations.add

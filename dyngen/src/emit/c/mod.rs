@@ -301,8 +301,8 @@ fn preparation(names: &Names, model: &Model, preparation: &Preparation) -> [Item
     // There is no array without elements.
     let count = preparation.values().len().max(1);
     let doc = documentation(&format!(
-        "Sums of the parameters as the functions use them; {prefix}_prepare makes them once for any\nnumber \
-        of calls."
+        "Sums of the parameters as the functions use them; {prefix}_prepare makes them once for any\n\
+        number of calls."
     ));
     let prepared = Item::Declared(format!(
         "{doc}typedef struct {{\n    {prefix}_real values[{count}];\n}} {prefix}_prepared;\n"

@@ -10,8 +10,8 @@ use std::collections::BTreeSet;
 pub(super) fn trig(names: &Names, model: &Model) -> [Item; 2] {
     let Names { prefix, upper } = names;
     let about = format!(
-        "Joint positions with their sines and cosines: {prefix}_trig_of computes them once for any\nnumber \
-        of calls."
+        "Joint positions with their sines and cosines: {prefix}_trig_of computes them once for any\n\
+        number of calls."
     );
     let extra = shifted_docs(model).into_iter().chain(sum_docs(model)).collect::<Vec<_>>();
     let about = if extra.is_empty() {

@@ -35,10 +35,9 @@ pub(super) fn bindings(names: &Names, parts: &Parts<'_>) -> String {
         format!("{meaning}@group(0) @binding({at}) var<storage, read> {prefix}_{name}: array<f32{length}>;\n")
     });
     format!(
-        "// How many states there are.\n@group(0) @binding(0) var<uniform> {prefix}_count: u32;\n{}\
-         // The result of whichever function is called.\n\
-         @group(0) @binding({RESULT}) var<storage, read_write> \
-         {prefix}_result: array<f32>;\n",
+        "// How many states there are.\n@group(0) @binding(0) var<uniform> {prefix}_count: u32;\n\
+         {}// The result of whichever function is called.\n\
+         @group(0) @binding({RESULT}) var<storage, read_write> {prefix}_result: array<f32>;\n",
         inputs.collect::<String>()
     )
 }

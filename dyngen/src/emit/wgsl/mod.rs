@@ -96,9 +96,9 @@ fn constants(names: &Names, model: &Model, parts: &Parts<'_>, options: &Options)
         format!("\n{doc}const {prefix}_parameter_values = {values};\n")
     });
     format!(
-        "// Number of joints.\n{joints}const {upper}_JOINTS: u32 = {}u;\n\n{}//\n{}const {upper}_PARAMETERS: \
-         u32 = {count}u;\n\n// Angles of a {prefix}_trig: those of the joints, then sums across parallel \
-         axes.\n\
+        "// Number of joints.\n{joints}const {upper}_JOINTS: u32 = {}u;\n\n{}//\n\
+         {}const {upper}_PARAMETERS: u32 = {count}u;\n\n\
+         // Angles of a {prefix}_trig: those of the joints, then sums across parallel axes.\n\
          const {upper}_ANGLES: u32 = {angles}u;\n{values}",
         arm.dof(),
         documentation(&docs::parameters(parts.set)),

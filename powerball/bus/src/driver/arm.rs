@@ -1,5 +1,5 @@
 //! The arm as the phases and the watches see it: its profile and mode, its joints, the time, and the way to
-//! the bus. Nothing here decides anything.
+//! the bus. No phase changes here.
 
 use super::budget::Budget;
 use super::cause::{Cause, Refusal};
@@ -70,7 +70,7 @@ impl<const N: usize> Arm<N> {
     /// The first joint whose drive is not in the right mode, without torque.
     pub(super) fn unready(&self) -> Option<usize> {
         let expected = self.mode().mode;
-        let ready = |joint: &Joint| joint.state().is_some_and(is_off) && joint.mode == Some(expected);
+        let ready = |joint: &Joint| joint.state().is_some_and(may_be_enabled) && joint.mode == Some(expected);
         self.joints.iter().position(|joint| !ready(joint))
     }
 
@@ -155,7 +155,7 @@ impl<const N: usize> Arm<N> {
     }
 }
 
-/// Whether a drive needs no change until it is enabled.
-pub(super) fn is_off(state: State) -> bool {
+/// Whether a drive in this state can be enabled: it has no torque and no fault.
+pub(super) fn may_be_enabled(state: State) -> bool {
     matches!(state, State::SwitchOnDisabled | State::ReadyToSwitchOn | State::SwitchedOn)
 }

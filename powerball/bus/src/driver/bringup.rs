@@ -1,6 +1,6 @@
 //! From silence to process data: the nodes boot, are identified, configured and verified.
 
-use super::arm::{Arm, is_off};
+use super::arm::{Arm, may_be_enabled};
 use super::budget::worst_bits;
 use super::cause::{Cause, Hindrance};
 use super::joint::Transmit;
@@ -31,11 +31,6 @@ impl Boot {
         Boot { resets: 0, since: now }
     }
 
-    /// Whether nothing was reset yet.
-    pub(super) const fn is_first(&self) -> bool {
-        self.resets == 0
-    }
-
     /// Takes the nodes further; true when all have booted.
     ///
     /// # Errors
@@ -45,7 +40,7 @@ impl Boot {
         arm: &mut Arm<N>,
         tx: &mut impl Transmit,
     ) -> Result<bool, Cause> {
-        if self.is_first() {
+        if self.resets == 0 {
             for joint in &mut arm.joints {
                 joint.client.cancel();
                 joint.presence.release();
@@ -382,7 +377,7 @@ pub(super) fn first_data<const N: usize>(arm: &Arm<N>, since: Micros) -> Option<
     let (node, joint) = (arm.node(j), arm.joints.get(j)?);
     Some(match (joint.state(), joint.mode) {
         (None, _) | (_, None) => Cause::DataMissing(node),
-        (Some(state), _) if !is_off(state) => {
+        (Some(state), _) if !may_be_enabled(state) => {
             Cause::Transition(node, state, State::SwitchOnDisabled, Hindrance::of(joint.status, true))
         }
         (_, Some(mode)) if mode != expected => Cause::WrongMode(node, mode),

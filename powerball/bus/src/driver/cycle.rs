@@ -6,7 +6,6 @@ use super::demand::ControlMode;
 use super::joint::Transmit;
 use super::machine::Driver;
 use super::stage::Stage;
-use super::stop::Stopped;
 use super::stream::Stream;
 use super::torque_mode::{TorqueWatch, Tracking};
 use super::watch::Watch;
@@ -88,10 +87,6 @@ impl<const N: usize> Driver<N> {
         let (now, arm) = (self.arm.now, &mut self.arm);
         match &mut self.stage {
             Stage::Boot(boot) => {
-                if boot.is_first() {
-                    self.raster.stop();
-                    self.raster.close();
-                }
                 if boot.poll(arm, tx)? {
                     let mut scripts = Scripts::new();
                     scripts.poll(arm, tx)?;
@@ -143,11 +138,14 @@ impl<const N: usize> Driver<N> {
         self.arm.joints.iter_mut().for_each(|joint| joint.presence.await_data());
         match &mut self.stage {
             Stage::Running(stream) => stream.await_setpoints(),
-            Stage::Stopping(stop) => {
-                if let Some(Stopped(kept)) = stop.advance(&self.arm) {
-                    self.end_stop(kept);
+            Stage::Stopping(stop) => match stop.advance(&self.arm) {
+                Ok(true) => self.end_stop(),
+                Ok(false) => {}
+                Err(cause) => {
+                    self.act(Some(cause), tx);
+                    self.end_stop();
                 }
-            }
+            },
             Stage::Resetting(reset) => match reset.advance(&mut self.arm, tx) {
                 Ok(true) => self.stage = Stage::Starting { since: self.arm.now },
                 Ok(false) => {}

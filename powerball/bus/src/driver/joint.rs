@@ -125,7 +125,7 @@ impl Joint {
         self.state().is_some_and(State::has_torque)
     }
 
-    /// Whether the drive says that it gives no torque.
+    /// Whether the drive reports that it gives no torque; in a fault it gives none either.
     pub(super) fn is_off(&self) -> bool {
         self.state().is_some_and(|state| !state.has_torque())
     }

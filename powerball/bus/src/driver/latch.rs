@@ -1,5 +1,4 @@
-//! What was latched: why the arm was stopped, and what must come before it moves again. Written where a cause
-//! is acted on, and by the caller's acknowledgement.
+//! What was latched: why the arm was stopped, and what must come before it moves again.
 
 use super::cause::{Cause, Details};
 

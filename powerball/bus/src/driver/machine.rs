@@ -195,8 +195,8 @@ impl<const N: usize> Driver<N> {
         self.act(full.then_some(Cause::TransmitQueueFull), tx);
     }
 
-    /// Acts on what a check has found, and nothing else does: the cause is latched where it is the first, and
-    /// what may move is stopped.
+    /// Acts on what a check has found; nothing but bus-off, in [`Driver::event`], is acted on elsewhere. The
+    /// cause is latched where it is the first, and what may move is stopped.
     pub(super) fn act(&mut self, found: Option<Cause>, tx: &mut impl Transmit) {
         let Some(cause) = found.filter(|_| !matches!(self.stage, Stage::Idle)) else { return };
         self.latch(cause);
@@ -255,10 +255,7 @@ impl<const N: usize> Driver<N> {
     }
 
     /// The joints are at rest, without torque, or one of them keeps it.
-    pub(super) fn end_stop(&mut self, kept: Option<Cause>) {
-        if let Some(cause) = kept {
-            self.latch(cause);
-        }
+    pub(super) fn end_stop(&mut self) {
         if self.latch.cause().is_some() {
             return self.fault();
         }

@@ -3,10 +3,15 @@
 use crate::canopen::Micros;
 use crate::canopen::sync::HeartbeatConsumer;
 
+/// Counts `wrong` cycles in a row: how many, this one included.
+fn count(before: &mut u8, wrong: bool) -> u8 {
+    *before = if wrong { before.saturating_add(1) } else { 0 };
+    *before
+}
+
 /// Counts `wrong` cycles in a row; whether they are as many as `limit`.
-pub(super) fn run(count: &mut u8, wrong: bool, limit: u8) -> bool {
-    *count = if wrong { count.saturating_add(1) } else { 0 };
-    *count >= limit
+pub(super) fn run(before: &mut u8, wrong: bool, limit: u8) -> bool {
+    count(before, wrong) >= limit
 }
 
 /// What came of one node.
@@ -77,15 +82,13 @@ impl Presence {
 
     /// A cycle ends: how many in a row, this one included, were without one of the PDOs `all`.
     pub(super) fn end_cycle(&mut self, all: u8) -> u8 {
-        run(&mut self.missing, self.arrived != all, u8::MAX);
-        self.missing
+        count(&mut self.missing, self.arrived != all)
     }
 
     /// A cycle ends: whether data came twice in `limit` cycles in a row, for the first time.
     pub(super) fn is_double(&mut self, limit: u8) -> bool {
         let twice = core::mem::take(&mut self.twice);
-        run(&mut self.twice_run, twice, limit);
-        self.twice_run == limit
+        count(&mut self.twice_run, twice) == limit
     }
 
     /// A SYNC leaves: the next cycle's data is awaited.

@@ -29,9 +29,10 @@ impl Raster {
         self.sync.start(now);
     }
 
-    /// No SYNC leaves any more; a slot that is open stays open.
+    /// No SYNC leaves any more, and no set-points of the last cycle.
     pub(super) fn stop(&mut self) {
         self.sync.stop();
+        self.open = false;
     }
 
     pub(super) const fn is_running(&self) -> bool {

@@ -28,10 +28,6 @@ pub(super) struct Stop<const N: usize> {
     unsent: [bool; N],
 }
 
-/// The end of a stop; with the cause, where a drive keeps its torque.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Stopped(pub(super) Option<Cause>);
-
 impl<const N: usize> Stop<N> {
     pub(super) const fn new(now: Micros) -> Self {
         Stop { since: now, stage: StopStage::Quick, unsent: [true; N] }
@@ -65,8 +61,11 @@ impl<const N: usize> Stop<N> {
         self.retry(arm, tx);
     }
 
-    /// Once a cycle: quick stop, brakes, torque off.
-    pub(super) fn advance(&mut self, arm: &Arm<N>) -> Option<Stopped> {
+    /// Once a cycle: quick stop, brakes, torque off; true at the end.
+    ///
+    /// # Errors
+    /// The cause, where the stop has ended and a drive keeps its torque.
+    pub(super) fn advance(&mut self, arm: &Arm<N>) -> Result<bool, Cause> {
         let reactions = &arm.profile.reactions;
         let settle = 3 * arm.profile.sync_period;
         match self.stage {
@@ -86,15 +85,15 @@ impl<const N: usize> Stop<N> {
             }
             StopStage::Brake { .. } => {}
             StopStage::Off { since } => match arm.joints.iter().position(|joint| !joint.is_off()) {
-                None if arm.elapsed(since) >= settle => return Some(Stopped(None)),
+                None if arm.elapsed(since) >= settle => return Ok(true),
                 Some(j) if arm.elapsed(since) >= reactions.transition_timeout => {
                     let status = arm.joints.get(j).and_then(|joint| joint.status);
-                    return Some(Stopped(status.map(|status| Cause::StateLost(arm.node(j), status))));
+                    return status.map_or(Ok(true), |status| Err(Cause::StateLost(arm.node(j), status)));
                 }
                 _ => {}
             },
         }
-        None
+        Ok(false)
     }
 }
 

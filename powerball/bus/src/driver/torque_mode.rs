@@ -114,8 +114,8 @@ impl Guarded {
     }
 }
 
-/// The guard of current mode of all joints. It is asked while the arm follows currents; each check says what
-/// is wrong, and does nothing about it.
+/// The guard of current mode of all joints, used while the arm follows currents. Each check returns a cause,
+/// and stops nothing.
 #[derive(Clone, Debug)]
 pub(super) struct TorqueWatch<const N: usize> {
     joints: [Guarded; N],

@@ -2,7 +2,7 @@
 //! torque, and the bits of the statusword other than its state. The master watches always, whatever the
 //! drives watch themselves.
 //!
-//! Each check is of one joint; it says what is wrong, and does nothing about it.
+//! Each check is of one joint; it returns a cause, and stops nothing.
 
 use super::arm::Arm;
 use super::cause::{Cause, Hindrance};

@@ -68,18 +68,18 @@ impl Behind<'_> {
         let read = c_api::read(motion);
         let hold = self.hold_payload(prefix);
         format!(
-            "    /// The model was not begun: nothing was written.
-    const NOT_BEGUN: i32 = 2;
+            "    /// The model was not started: nothing was written.
+    const NOT_STARTED: i32 = 2;
     /// Words of a model.
     const WORDS: usize = {room};
-    /// What a model that was begun starts with.
-    const BEGUN: u64 = 0x706f_7765_7262_616c;
+    /// What a model that was started begins with.
+    const STARTED: u64 = 0x706f_7765_7262_616c;
 
     /// A caller's memory for a model.
     #[repr(C)]
     #[derive(Debug)]
     pub struct Room {{
-        begun: u64,
+        started: u64,
         words: [u64; WORDS],
     }}
 
@@ -88,24 +88,25 @@ impl Behind<'_> {
 
     impl Room {{
         fn model(&mut self) -> Option<&mut TorqueModel> {{
-            // SAFETY: `begin` has put a model there, which fits as asserted above.
-            (self.begun == BEGUN).then(|| unsafe {{ &mut *self.words.as_mut_ptr().cast::<TorqueModel>() }})
+            let started = self.started == STARTED;
+            // SAFETY: `start` has put a model there, which fits as asserted above.
+            started.then(|| unsafe {{ &mut *self.words.as_mut_ptr().cast::<TorqueModel>() }})
         }}
     }}
 
-    /// Begins a model that remembers nothing yet.
+    /// Starts a model that remembers nothing yet.
     ///
     /// # Safety
     /// `model` is null or a caller's own room, which nobody else uses now.
     #[unsafe(no_mangle)]
-    pub unsafe extern \"C\" fn {prefix}_begin(model: *mut Room) -> i32 {{
+    pub unsafe extern \"C\" fn {prefix}_start(model: *mut Room) -> i32 {{
         if model.is_null() {{
             return NULL;
         }}
         // SAFETY: the caller's promise; it is not null. All is written before any of it is read, and a model
         // needs no drop.
         unsafe {{
-            model.write(Room {{ begun: BEGUN, words: [0; WORDS] }});
+            model.write(Room {{ started: STARTED, words: [0; WORDS] }});
             (&raw mut (*model).words).cast::<TorqueModel>().write(TorqueModel::default());
         }}
         OK
@@ -132,9 +133,9 @@ impl Behind<'_> {
 {read}        // SAFETY: the caller's promise; where it is not null.
         let degrees = (!temperature.is_null()).then(|| unsafe {{ temperature.cast::<[Real; {n}]>().read() }});
         // SAFETY: the caller's promise; it is not null.
-        let Some(begun) = (unsafe {{ (*model).model() }}) else {{ return NOT_BEGUN }};
+        let Some(started) = (unsafe {{ (*model).model() }}) else {{ return NOT_STARTED }};
         let degrees = degrees.as_ref().map_or(&[][..], |all| all);
-        let values = begun.torque(&q, &dq, &ddq, running, degrees);
+        let values = started.torque(&q, &dq, &ddq, running, degrees);
         // SAFETY: the caller's promise; it is not null.
         unsafe {{ torque.cast::<[Real; {n}]>().write(values.into()) }};
         OK
@@ -158,7 +159,7 @@ impl Behind<'_> {
     pub unsafe extern \"C\" fn {prefix}_hold_payload(model: *mut Room, holds: i32) -> i32 {{
         // SAFETY: the caller's promise.
         let Some(room) = (unsafe {{ model.as_mut() }}) else {{ return NULL }};
-        let Some(model) = room.model() else {{ return NOT_BEGUN }};
+        let Some(model) = room.model() else {{ return NOT_STARTED }};
         model.holds_payload = holds != 0;
         OK
     }}
@@ -192,12 +193,12 @@ impl Behind<'_> {
         format!(
             "/* A model with what its terms remember: the caller's own memory, one for each arm. */
 typedef struct {prefix}_model {{
-  uint64_t begun;
+  uint64_t started;
   uint64_t words[{}];
 }} {prefix}_model;
 
-/* Begins a model that remembers nothing yet: before the first call, and before another path. */
-int {prefix}_begin({prefix}_model *model);
+/* Starts a model that remembers nothing yet: before the first call, and before another path. */
+int {prefix}_start({prefix}_model *model);
 
 {}{hold}",
             self.room(),

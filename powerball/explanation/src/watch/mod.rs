@@ -111,9 +111,9 @@ impl<'a> Watch<'a> {
         colours.filter(|(_, colour)| colour.is_some()).map(|(j, _)| JointNumber::from_index(j)).collect()
     }
 
-    /// Whether there were enough samples to begin.
+    /// Whether there were enough samples to start.
     #[must_use]
-    pub fn has_begun(&self) -> bool {
+    pub fn has_started(&self) -> bool {
         self.stream.is_some()
     }
 }

@@ -178,8 +178,8 @@ fn closed_forms_are_met() {
 fn the_body_of_a_joint_is_the_arms_inverse_dynamics() {
     let joint = |a: f64, alpha: &str| {
         format!(
-            "[[joint]]\nkind = \"revolute\"\na = {a}\nalpha = {alpha}\nd = 0.1\ntheta = \
-            0\n[joint.servo]\nkp = 1\n"
+            "[[joint]]\nkind = \"revolute\"\na = {a}\nalpha = {alpha}\nd = 0.1\ntheta = 0\n[joint.servo]\n\
+            kp = 1\n"
         )
     };
     let text = format!(
@@ -218,9 +218,8 @@ fn the_body_of_a_joint_is_the_arms_inverse_dynamics() {
 
 #[test]
 fn what_cannot_be_simulated_is_refused() {
-    let text = "name = \"p\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\n[[joint]]\nkind = \
-        \"prismatic\"\na = 0\n\
-                alpha = 0\nd = 0\ntheta = 0\n";
+    let text = "name = \"p\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\n[[joint]]\n\
+        kind = \"prismatic\"\na = 0\nalpha = 0\nd = 0\ntheta = 0\n";
     let why = ServoArm::new(&Arm::parse(text, "p.toml").unwrap(), None).unwrap_err().to_string();
     assert!(why.contains("joint 1 is prismatic"), "{why}");
 }

@@ -98,9 +98,8 @@ pub(super) fn counts_per_degree(
 mod tests {
     use super::*;
 
-    const JOINT: &str = "node = 3\nposition = [-1.0, 1.0]\nvelocity = 1.0\nacceleration = \
-        1.0\nrated_torque = 1.0\n\
-        current = 1.0\n";
+    const JOINT: &str = "node = 3\nposition = [-1.0, 1.0]\nvelocity = 1.0\nacceleration = 1.0\n\
+        rated_torque = 1.0\ncurrent = 1.0\n";
 
     fn scaled(objects: &[(&str, &str)], given: &str) -> Result<(f64, Option<String>), ImportError> {
         let section = |(name, value): &(&str, &str)| format!("[{name}]\nDataType=7\nDefaultValue={value}\n");

@@ -93,9 +93,9 @@ fn profile(out: &mut String, drive: &Dcf, arm: &Arm, constant: &str) -> Result<(
         None => (1, 1, 1.0, false),
     };
     line(format!(
-        "    velocity_scale: VelocityScale {{\n        numerator: {numerator},\n        denominator: \
-         {denominator},\n        millidegrees: {millidegrees:?},\n        verified_on_hardware: \
-         {verified},\n    }},"
+        "    velocity_scale: VelocityScale {{\n        numerator: {numerator},\n        \
+         denominator: {denominator},\n        millidegrees: {millidegrees:?},\n        \
+         verified_on_hardware: {verified},\n    }},"
     ));
     line("    tpdos: [".into());
     if let Some(unknown) = arm.transmit.keys().find(|key| !["1", "2", "3", "4"].contains(&key.as_str())) {
@@ -155,8 +155,8 @@ fn mode(drive: &Dcf, table: &ModeTable, name: &str, bits: &str) -> Result<String
         }
     }
     Ok(format!(
-        "ModeProfile {{\n        mode: Mode::from_code({}),\n        setpoint: {},\n        rpdo: \
-         {rpdo},\n        running_bits: {bits},\n        verified_on_hardware: {},\n    }}",
+        "ModeProfile {{\n        mode: Mode::from_code({}),\n        setpoint: {},\n        \
+         rpdo: {rpdo},\n        running_bits: {bits},\n        verified_on_hardware: {},\n    }}",
         table.mode,
         object(table.setpoint.object),
         table.verified_on_hardware

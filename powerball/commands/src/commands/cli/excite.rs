@@ -287,8 +287,9 @@ fn in_words(result: &Excited, files: &[PathBuf]) -> String {
     for trajectory in &result.trajectories {
         let _ = writeln!(
             out,
-            "\njoint   position [rad]     of limit        velocity  of limit   acceleration  of limit   \
-            torque  of limit"
+            "\n\
+            joint   position [rad]     of limit        velocity  of limit   acceleration  of limit   torque  \
+            of limit"
         );
         let torque = trajectory.tightest.torque.as_ref();
         for (i, ([low, high, velocity, acceleration], limit)) in

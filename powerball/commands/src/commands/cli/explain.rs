@@ -378,8 +378,9 @@ fn advice(verdict: &Verdict) -> String {
 
 fn evidence(effect: &NamedEffect, sliding: &[bool]) -> String {
     let mut text = format!(
-        "{} on joint {}: {}\n  p = {:.1e}, evidence {:.2} times that of the next name, {:.0} % of the excess \
-         over noise left, right in {:.0} of 100\n",
+        "{} on joint {}: {}\n  \
+         p = {:.1e}, evidence {:.2} times that of the next name, {:.0} % of the excess over noise left, \
+         right in {:.0} of 100\n",
         effect.effect,
         list(&effect.joints),
         effect.size(sliding),

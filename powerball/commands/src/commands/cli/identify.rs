@@ -26,13 +26,12 @@ use std::path::{Path, PathBuf};
 /// as values for `dyngen generate --values`; covariance.json: the covariance of all of it, for `powerball
 /// compare`.
 #[derive(Args, Debug)]
-#[command(
-    after_help = "Examples:\n  powerball identify --arm arm.toml --log a.csv b.csv --validate c.csv --out \
-        result\n  powerball identify --arm arm.toml --log a.summary b.summary --out result\n  \
+#[command(after_help = "Examples:\n  \
+    powerball identify --arm arm.toml --log a.csv b.csv --validate c.csv --out result\n  \
+    powerball identify --arm arm.toml --log a.summary b.summary --out result\n  \
     powerball identify --arm arm.toml --log upright.csv --mounting 90,0 --log on_its_side.csv --out \
-    result\n  powerball identify --arm servos.toml --log goals_and_positions.csv --validate other.csv --out \
-    result"
-)]
+    result\n  \
+    powerball identify --arm servos.toml --log goals_and_positions.csv --validate other.csv --out result")]
 pub(crate) struct Identify {
     /// The arm file (TOML).
     #[arg(long, value_name = "ARM.toml")]

@@ -15,11 +15,10 @@ use std::path::{Path, PathBuf};
 /// CSV, Parquet, LeRobot datasets, MCAP, bags of ROS 1 and 2 (also their folders), npz, npy, mat and HDF5.
 /// With an arm also the log that `identify` would read. Exit code 1 where a file is not a log of that arm.
 #[derive(Args, Debug)]
-#[command(
-    after_help = "Examples:\n  powerball log recording.mcap --out looked\n  powerball log bag_0.db3 --arm \
-        arm.toml --map 'joints = [\"shoulder_pan_joint\", \"shoulder_lift_joint\"]'\n  powerball log run.csv \
-        --arm arm.toml --model result/identified.json --to mcap -o run.mcap"
-)]
+#[command(after_help = "Examples:\n  powerball log recording.mcap --out looked\n  \
+        powerball log bag_0.db3 --arm arm.toml --map 'joints = [\"shoulder_pan_joint\", \
+        \"shoulder_lift_joint\"]'\n  \
+        powerball log run.csv --arm arm.toml --model result/identified.json --to mcap -o run.mcap")]
 pub(crate) struct LogCommand {
     /// The files.
     #[arg(value_name = "FILE", required = true)]

@@ -50,10 +50,10 @@ fn overlays_set_what_the_drive_has_and_nothing_else() {
 }
 
 /// A compact array as CiA 306 describes it, its lists before it and in other case.
-const COMPACT: &str = "[1003name]\nNrOfEntries=1\n2=Older ; not the \
-    newest\n[1003VALUE]\nNrOfEntries=2\n1=0x8130;text\n\
-    3=$NODEID+1\n[1003]\nParameterName=Errors\nObjectType=0x8\nDataType=0x7\nAccessType=ro\nDefaultValue=7\n\
-    PDOMapping=0\nCompactSubObj=3 ; parts\n[1003Sub3]\nParameterName=Own\nDataType=0x7\nDefaultValue=9\n";
+const COMPACT: &str = "[1003name]\nNrOfEntries=1\n2=Older ; not the newest\n[1003VALUE]\nNrOfEntries=2\n\
+    1=0x8130;text\n3=$NODEID+1\n[1003]\nParameterName=Errors\nObjectType=0x8\nDataType=0x7\nAccessType=ro\n\
+    DefaultValue=7\nPDOMapping=0\nCompactSubObj=3 ; parts\n[1003Sub3]\nParameterName=Own\nDataType=0x7\n\
+    DefaultValue=9\n";
 
 #[test]
 fn parts_of_a_compact_array_share_its_section() {

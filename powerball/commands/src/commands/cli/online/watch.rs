@@ -26,13 +26,12 @@ use std::path::PathBuf;
 /// alarm in `--hours` of motion on average, as long as the model's error is no larger than on the logs it was
 /// explained on and friction stays within `--friction-range`. Rows at rest are not watched.
 #[derive(Args, Debug)]
-#[command(
-    after_help = "Examples:\n  powerball watch --arm arm.toml --model result/model.json --log today.csv \
-    --json\n  ros2_to_csv | powerball watch --arm arm.toml --model result/model.json -\n\n\
+#[command(after_help = "Examples:\n  \
+    powerball watch --arm arm.toml --model result/model.json --log today.csv --json\n  \
+    ros2_to_csv | powerball watch --arm arm.toml --model result/model.json -\n\n\
     With - rows are read from standard input as they come: CSV with a header line, or an object with the \
     same\n\
-    keys on each line ({\"t\": 0.005, \"q1\": …, \"tau1\": …} or {\"t\": 0.005, \"q\": […], \"tau\": […]})."
-)]
+    keys on each line ({\"t\": 0.005, \"q1\": …, \"tau1\": …} or {\"t\": 0.005, \"q\": […], \"tau\": […]}).")]
 #[command(group(clap::ArgGroup::new("from").required(true).args(["log", "bus", "stream"])))]
 pub(crate) struct WatchCommand {
     /// The arm file (TOML).
@@ -281,7 +280,7 @@ impl WatchCommand {
             }
         }
         let usable = seen.samples;
-        if !watch.has_begun() {
+        if !watch.has_started() {
             return Err(Failure::Unusable(format!(
                 "{NAME}: {usable} usable samples are too few: at least {FIRST} are needed"
             )));

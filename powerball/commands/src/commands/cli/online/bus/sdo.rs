@@ -12,9 +12,9 @@ use serde_json::json;
 
 /// Read or write one object of a node.
 #[derive(Args, Debug)]
-#[command(after_help = "Examples:\n  powerball bus sdo read 3 0x6041\n  powerball bus sdo read 3 0x1018:1 \
-    --json\n  powerball bus sdo write 3 0x200E 6\n\nNumbers are decimal or 0x… The type is that of the \
-    drive's DCF; --type sets another.")]
+#[command(after_help = "Examples:\n  powerball bus sdo read 3 0x6041\n  \
+    powerball bus sdo read 3 0x1018:1 --json\n  powerball bus sdo write 3 0x200E 6\n\n\
+    Numbers are decimal or 0x… The type is that of the drive's DCF; --type sets another.")]
 pub(crate) struct Sdo {
     #[command(subcommand)]
     what: Direction,
