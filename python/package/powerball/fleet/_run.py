@@ -71,18 +71,22 @@ def update(client: dd.Client, job: Job, logs: Sequence[str], retry: bool = False
     start = time.perf_counter()
     # Every worker reads this file once. Dask's `scatter` can lose what it shares (dask/distributed#3703).
     known_file = store.write_known(known)
-    # A worker that dies takes its logs to another one; a log that kills every worker is given up.
-    futures = {client.submit(reduce_log, job, one, known_file, pure=False, retries=1): one for one in todo}
-    outcomes = []
-    for future in dd.as_completed(futures):
-        if future.status == "finished":
-            outcomes.append(future.result())
-        else:
-            row = failed_row(job, futures[future], f"the worker ended: {future.exception()}")
-            store.add(row)
-            outcomes.append(Outcome(row["log"], row["key"], "failed", 0.0, row["size"], 0, "none"))
-        future.release()
-    _files.remove(known_file)
+    try:
+        # A worker that dies takes its logs to another one; a log that kills every worker is given up.
+        futures = {
+            client.submit(reduce_log, job, one, known_file, pure=False, retries=1): one for one in todo
+        }
+        outcomes = []
+        for future in dd.as_completed(futures):
+            if future.status == "finished":
+                outcomes.append(future.result())
+            else:
+                row = failed_row(job, futures[future], f"the worker ended: {future.exception()}")
+                store.add(row)
+                outcomes.append(Outcome(row["log"], row["key"], "failed", 0.0, row["size"], 0, "none"))
+            future.release()
+    finally:
+        _files.remove(known_file)
     store.compact()
     again = sum(outcome.verdict == "known" for outcome in outcomes)
     new = [outcome for outcome in outcomes if outcome.verdict != "known"]

@@ -74,6 +74,8 @@ def reduce_log(job: Job, found: Found, known_file: str) -> Outcome:
     ``known_file``: the keys of logs that need not be computed again, as ``Store.write_known`` writes them.
     """
     start, store, size = time.perf_counter(), Store(job.store), 0
+    # Not below: that this file cannot be read says nothing about the log.
+    known = read_known(known_file)
     row: Row = {name: None for name in SCHEMA.names}
     row.update(setup=job.setup, log=found.log, size=found.size, stamp=found.stamp, date=found.written)
     try:
@@ -85,7 +87,7 @@ def reduce_log(job: Job, found: Found, known_file: str) -> Outcome:
                 fs.get_file(name, here)
             row["hash"] = _hash(here)
             row["key"] = _files.key_of(job.setup, row["hash"])
-            if row["key"] in read_known(known_file):
+            if row["key"] in known:
                 return _outcome(row, "known", start, 0)
             row["unit"] = unit_of(job.rule, found.log, here)
             row["date"] = date_of(job.rule, found, here)
