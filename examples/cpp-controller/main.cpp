@@ -47,7 +47,7 @@ int main() {
   my_arm_model never_started = {};
   Vector zero{}, torque{};
   if (my_arm_torque(&never_started, zero.data(), zero.data(), zero.data(), 0, nullptr, torque.data()) != MY_ARM_NOT_STARTED) {
-    return fail("a model without begin gives torques");
+    return fail("a model that was not started gives torques");
   }
   if (my_arm_start(nullptr) != MY_ARM_NULL) {
     return fail("null is taken for a model");

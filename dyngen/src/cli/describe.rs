@@ -267,12 +267,14 @@ fn rounding_table(t: &mut String, arm: &Arm, rounding: &Rounding) {
     );
     let _ = writeln!(t, "  {:<36} {:>8} {:>8}  decimals that hold in f32, f64", "function", "f32", "f64");
     for (function, bounds) in &rounding.functions {
-        if let (Ok(of), None) = (bounds, why_unbounded(bounds)) {
-            let worst = |all: &[f64]| all.iter().copied().fold(0.0, f64::max);
+        let Ok(of) = bounds else { continue };
+        let [single, double] = [&of.single, &of.double].map(|all| all.iter().copied().fold(0.0, f64::max));
+        if double.is_finite() {
             let name = function.name();
-            let [single, double] = [worst(&of.single), worst(&of.double)];
+            let number = |x: f64| if x.is_finite() { format!("{x:.1e}") } else { "-".to_string() };
             let [few, many] = [single, double].map(decimals);
-            let _ = writeln!(t, "  {name:<36} {single:>8.1e} {double:>8.1e}  {few:>8} {many:>4}");
+            let single = number(single);
+            let _ = writeln!(t, "  {name:<36} {single:>8} {double:>8.1e}  {few:>8} {many:>4}");
         }
     }
     by_joint(t, arm, rounding);
@@ -290,7 +292,11 @@ fn rounding_table(t: &mut String, arm: &Arm, rounding: &Rounding) {
 /// How many digits after the point a bound leaves right to half a unit.
 fn decimals(bound: f64) -> String {
     let digits = (-(2.0 * bound).log10()).floor();
-    if bound == 0.0 { "all".to_string() } else { format!("{:.0}", digits.max(0.0)) }
+    match bound {
+        0.0 => "all".to_string(),
+        _ if bound.is_infinite() => "-".to_string(),
+        _ => format!("{:.0}", digits.max(0.0)),
+    }
 }
 
 /// What each joint's torque and acceleration may be off.
@@ -301,10 +307,9 @@ fn by_joint(t: &mut String, arm: &Arm, rounding: &Rounding) {
     ];
     for (function, letter, units) in units {
         let found = rounding.functions.iter().find(|(f, _)| *f == function);
-        let Some((_, Ok(bounds))) = found.filter(|(_, bounds)| why_unbounded(bounds).is_none()) else {
-            continue;
-        };
-        for (precision, all) in [("f32", &bounds.single), ("f64", &bounds.double)] {
+        let Some((_, Ok(bounds))) = found else { continue };
+        let both = [("f32", &bounds.single), ("f64", &bounds.double)];
+        for (precision, all) in both.into_iter().filter(|(_, all)| all.iter().all(|x| x.is_finite())) {
             let entry = |(joint, bound): (&Joint, &f64)| {
                 format!("{bound:.1e} {}", units[usize::from(joint.kind == JointKind::Prismatic)])
             };

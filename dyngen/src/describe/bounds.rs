@@ -61,11 +61,15 @@ impl Rounding {
     }
 }
 
-/// Why a function has no bound, or one of its outputs has none.
+/// Why a function has no bound, or one of its outputs has none in `f32`.
 pub fn why_unbounded(bounds: &Result<Bounds, String>) -> Option<&str> {
+    let is_bounded = |all: &[f64]| all.iter().all(|x| x.is_finite());
     match bounds {
         Err(why) => Some(why),
-        Ok(bounds) if bounds.single.iter().all(|x| x.is_finite()) => None,
+        Ok(bounds) if is_bounded(&bounds.single) => None,
+        Ok(bounds) if is_bounded(&bounds.double) => {
+            Some("in f32: its rounding may change B by more than this proof allows")
+        }
         Ok(_) => Some("intervals of these states do not exclude a division by zero"),
     }
 }

@@ -253,9 +253,8 @@ extern \"C\" {{
 #define {guard}_JOINTS {joints}
 typedef {real} {prefix}_real;
 
-/* What every function gives: done; a pointer is null; the model was not started. In the last two cases \
-nothing was
- * written. */
+/* What every function returns: done; a pointer is null; the model was not started. After the last two nothing \
+was written. */
 #define {guard}_OK 0
 #define {guard}_NULL 1
 #define {guard}_NOT_STARTED 2

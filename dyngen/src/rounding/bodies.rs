@@ -1,7 +1,7 @@
 //! Ranges of LᵀDL and of B⁻¹ from the links' bodies alone, for every pose: where boxes of poses prove
 //! nothing, since the last links are light.
 //!
-//! Twice the kinetic energy, q̇ᵀBq̇, is at least that of any of the links, where each is a body.
+//! Twice the kinetic energy, q̇ᵀBq̇, is at least twice that of any one link, where every link is a body.
 //!
 //! * A pivot dᵢ is q̇ᵀBq̇ at its smallest with q̇ᵢ = 1 and the joints before at rest (Featherstone, *Rigid
 //!   Body Dynamics Algorithms* (2008), §7.3: the articulated inertia about the joint). The link alone has its
@@ -23,35 +23,53 @@ use nalgebra::{Matrix3, Vector3};
 
 /// A link as a body.
 struct Body {
+    /// kg
     mass: f64,
-    /// Its centre in the link's frame.
+    /// The centre of mass in the link's frame, m.
     centre: Vector3<f64>,
-    /// Inverse of its inertia about the centre.
+    /// Inverse of the inertia about the centre, 1/(kg·m²).
     of_inertia: Matrix3<f64>,
-    /// Inertia about the frame's origin.
+    /// Inertia about the frame's origin, kg·m².
     about_origin: Matrix3<f64>,
+    /// First moment of mass in the link's frame, kg·m.
     moment: Vector3<f64>,
 }
 
-/// A joint's axis in a link's frame: its direction, and a point that it goes through.
+/// A joint's axis in a link's frame: its direction, and a point that it goes through, m.
 struct Axis {
     z: Vector3<f64>,
     point: Vector3<f64>,
 }
 
-/// The ranges for `values` of the full set; `None` where a link is no body with mass and volume, or the
-/// energy is more than that of the links: rotors, bars of loops, joints that follow others.
-pub(super) fn factors(arm: &Arm, set: &ParameterSet, values: &[f64], mass: &MassMatrix) -> Option<Factors> {
+/// The ranges for `values` of the full set.
+///
+/// # Errors
+/// Where a link is no body with mass and volume, or the energy is more than that of the links: rotors, bars of
+/// loops, joints that follow others.
+pub(super) fn factors(
+    arm: &Arm,
+    set: &ParameterSet,
+    values: &[f64],
+    mass: &MassMatrix,
+) -> Result<Factors, String> {
+    if let Some(i) = arm.joints.iter().position(|joint| joint.rotor_ratio.is_some()) {
+        return Err(format!("joint {} has a rotor", i + 1));
+    }
+    if arm.has_mimics() || !arm.bars.is_empty() {
+        return Err("joints follow others".to_string());
+    }
+    if values.len() != set.parameters.len() {
+        return Err(format!("{} values for {} parameters", values.len(), set.parameters.len()));
+    }
+    let n = arm.joints.len();
+    let of = |link| Body::of(set, values, link).ok_or_else(|| format!("link {} has no volume", link + 1));
+    let bodies = (0..n).map(of).collect::<Result<Vec<Body>, String>>()?;
+    of_bodies(arm, &bodies, mass).ok_or_else(|| "rounded parameters may change B by too much".to_string())
+}
+
+fn of_bodies(arm: &Arm, bodies: &[Body], mass: &MassMatrix) -> Option<Factors> {
     let most = mass.largest_diagonal(HALVINGS)?;
     let n = most.len();
-    if arm.joints.len() != n
-        || !arm.bars.is_empty()
-        || arm.joints.iter().any(|joint| joint.rotor_ratio.is_some())
-    {
-        return None;
-    }
-    let bodies: Option<Vec<Body>> = (0..n).map(|link| Body::of(arm, set, values, link)).collect();
-    let bodies = bodies?;
     let (mut least, mut velocity) = (vec![0.0; n], vec![0.0; n]);
     for (i, joint) in arm.joints.iter().enumerate() {
         let [before, own] = axis(arm.convention, joint);
@@ -112,7 +130,8 @@ const ROUNDED: f64 = 1.0 + 1e-9;
 const THIN: f64 = 1e-9;
 
 impl Body {
-    fn of(arm: &Arm, set: &ParameterSet, values: &[f64], link: usize) -> Option<Body> {
+    /// `None` where it has no volume ([`THIN`]).
+    fn of(set: &ParameterSet, values: &[f64], link: usize) -> Option<Body> {
         let given = |kind: &ParameterKind| -> f64 {
             let wanted = Parameter { link, kind: *kind };
             let own = |p: &SetParameter| matches!(&p.terms[..], [(q, _)] if *q == wanted);
@@ -120,7 +139,7 @@ impl Body {
         };
         let v: [f64; 10] = std::array::from_fn(|k| given(&ParameterKind::ALL[k]));
         let eigenvalues = pseudo_inertia(&v).symmetric_eigenvalues();
-        if eigenvalues.min() <= THIN * eigenvalues.max() || arm.joints.get(link).is_none() {
+        if eigenvalues.min() <= THIN * eigenvalues.max() {
             return None;
         }
         let [mass, mx, my, mz, xx, xy, xz, yy, yz, zz] = v;

@@ -6,7 +6,7 @@
 //! Higham 2002, §3.3). The derivatives by each rounding are operations like the others: at every t·δ they are
 //! within the same two.
 
-use super::energy::Solves;
+use super::energy::{SoFar, Solves};
 use super::interval::Interval;
 use super::known::{Known, KnownProgram};
 use super::precision::PRECISIONS;
@@ -51,21 +51,21 @@ impl Program {
                     value.clamped(most * (1.0 + 1e-12))
                 }
             };
-            let mut deviation = [0, 1].map(|p| no_number_is_infinite((from_operands[p] + error[p]) * GROWN));
+            let deviation = [0, 1].map(|p| no_number_is_infinite((from_operands[p] + error[p]) * GROWN));
             if value.magnitude().is_nan() {
                 return None;
             }
-            if value.magnitude() + deviation[0] >= f64::from(f32::MAX) {
-                deviation[0] = f64::INFINITY;
-            }
+            values.push(value);
+            deviations.push(deviation);
             if let (Some(solves), Some(running)) = (solves, &mut running)
                 && k < self.emitted
             {
-                let own = (value, deviation, error);
-                (value, deviation) = solves.take(running, *operation, own, (values, deviations));
+                let so_far = SoFar { operations: &self.operations, values, deviations, errors };
+                (values[k], deviations[k]) = solves.take(running, so_far);
             }
-            values.push(value);
-            deviations.push(deviation);
+            if values[k].magnitude() + deviations[k][0] >= f64::from(f32::MAX) {
+                deviations[k][0] = f64::INFINITY;
+            }
         }
         let mut total = [0.0; 2];
         for (slope, error) in self.slopes.iter().zip(&*errors) {

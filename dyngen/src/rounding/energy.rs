@@ -46,17 +46,29 @@ pub(super) struct Exact {
     pub(super) solutions: Vec<Vec<Fp>>,
 }
 
+/// An entry of a right-hand side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Right {
+    Zero,
+    /// The value of this operation.
+    At(usize),
+    /// No operation has its value: it is mixed with what is subtracted from it.
+    Mixed,
+}
+
 /// The solves of a program.
 #[derive(Clone, Debug)]
 pub(super) struct Solves {
     /// By emitted operation.
     roles: Vec<Option<Role>>,
-    /// By solve and entry the operation that is its right-hand side; none where that is zero.
-    rights: Vec<Vec<Option<usize>>>,
-    /// By emitted operation whether it is a right-hand side.
-    is_right: Vec<bool>,
+    /// By emitted operation with a role those between it and other roles, in order.
+    between: Vec<Vec<usize>>,
+    /// By emitted operation the solves and entries of which it is the right-hand side.
+    given: Vec<Vec<(usize, usize)>>,
+    /// By solve and entry.
+    rights: Vec<Vec<Right>>,
     pivots: Vec<Interval>,
-    /// Largest entries of B's diagonal.
+    /// Largest entries of B's diagonal, kg·m² or kg.
     diagonal: Vec<f64>,
     /// √bᵢ
     mobility: Vec<f64>,
@@ -67,8 +79,18 @@ pub(super) struct Solves {
 pub(super) struct Running {
     eta: Errors,
     rho: Vec<Errors>,
-    /// What each operation is off if factors and results of solves are taken as they were computed.
-    local: Vec<Errors>,
+    /// By solve and entry how large a right-hand side is at most.
+    rights: Vec<Vec<f64>>,
+}
+
+/// Of the operations up to the present one: ranges of their exact values, how far they are off, and what they
+/// round by themselves. The last one is the present operation's, forwards from its operands.
+#[derive(Clone, Copy)]
+pub(super) struct SoFar<'a> {
+    pub(super) operations: &'a [Operation],
+    pub(super) values: &'a [Interval],
+    pub(super) deviations: &'a [Errors],
+    pub(super) errors: &'a [Errors],
 }
 
 impl Solves {
@@ -83,13 +105,19 @@ impl Solves {
         let (diagonal, n) = (ranges.diagonal.clone()?, exact.n);
         let mut found = Recognised::new(exact, operations, values);
         found.replace(&[]);
-        let rights: Vec<Vec<Option<usize>>> = (0..exact.solutions.len()).map(|s| found.solve(s)).collect();
-        let mut is_right = vec![false; operations.len()];
-        rights.iter().flatten().flatten().for_each(|r| is_right[*r] = true);
+        let rights: Vec<Vec<Right>> = (0..exact.solutions.len()).map(|s| found.solve(s)).collect();
+        let mut given = vec![Vec::new(); operations.len()];
+        for (s, i) in (0..rights.len()).flat_map(|s| (0..n).map(move |i| (s, i))) {
+            if let Right::At(k) = rights[s][i] {
+                given[k].push((s, i));
+            }
+        }
+        let between = between(operations, &found.roles, |k| given[k].iter().any(|(_, i)| i + 1 == n));
         Some(Solves {
             roles: found.roles,
+            between,
+            given,
             rights,
-            is_right,
             pivots: ranges.pivots.clone(),
             diagonal,
             mobility: (0..n).map(|i| ranges.inverse[i * n + i].high.sqrt()).collect(),
@@ -97,56 +125,153 @@ impl Solves {
     }
 
     pub(super) fn start(&self) -> Running {
-        Running { eta: [0.0; 2], rho: vec![[0.0; 2]; self.rights.len()], local: Vec::new() }
+        let size = |right: &Right| if *right == Right::Zero { 0.0 } else { f64::INFINITY };
+        Running {
+            eta: [0.0; 2],
+            rho: vec![[0.0; 2]; self.rights.len()],
+            rights: self.rights.iter().map(|all| all.iter().map(size).collect()).collect(),
+        }
     }
 
-    /// Takes the next operation in: the range of its exact value, a forward bound of how far it is off, and
-    /// what it rounds by itself. `values` and `deviations` are those of the operations before. Returns range
-    /// and bound with what is known of solves.
-    pub(super) fn take(
-        &self,
-        running: &mut Running,
-        operation: Operation,
-        (value, deviation, rounds): (Interval, Errors, Errors),
-        (values, deviations): (&[Interval], &[Errors]),
-    ) -> (Interval, Errors) {
-        let k = running.local.len();
-        let local = [0, 1].map(|p| match self.is_right.get(k) {
-            Some(true) => deviation[p],
-            _ => local(operation, p, &running.local, rounds[p], (values, deviations)),
-        });
-        let Some(role) = self.roles.get(k).copied().flatten() else {
-            running.local.push(local);
-            return (value, deviation);
-        };
-        running.local.push([0.0; 2]);
-        let energy = |s: usize| -> f64 {
-            let size = |r: usize| values.get(r).copied().unwrap_or(value).magnitude();
-            let entry = |(j, r): (usize, &Option<usize>)| r.map_or(0.0, size) * self.mobility[j];
-            self.rights[s].iter().enumerate().map(entry).sum::<f64>() * GROWN
-        };
-        let most = match role {
-            Role::Right(s, i) => self.pivots[i].high.sqrt() * energy(s),
-            Role::Half(s, i) => energy(s) / self.pivots[i].low.sqrt(),
-            Role::Solution(s, i) => self.mobility[i] * energy(s),
-            _ => f64::INFINITY,
-        };
-        let energy = match role {
-            Role::Right(s, _) | Role::Half(s, _) | Role::Solution(s, _) => energy(s),
+    /// Takes the present operation in; returns its range and how far it is off with what is known of solves.
+    pub(super) fn take(&self, running: &mut Running, so_far: SoFar<'_>) -> (Interval, Errors) {
+        let k = so_far.values.len() - 1;
+        let (mut value, mut deviation) = (so_far.values[k], so_far.deviations[k]);
+        for (s, i) in &self.given[k] {
+            running.rights[*s][*i] = value.magnitude();
+        }
+        if let Some(role) = self.roles[k] {
+            if let Role::Right(s, i) = role
+                && self.rights[s][i] == Right::Mixed
+            {
+                running.rights[s][i] = self.mixed(k, so_far).magnitude();
+            }
+            let (most, energy) = match role {
+                Role::Right(s, i) => {
+                    let energy = self.energy(running, s, i);
+                    (self.pivots[i].high.sqrt() * energy, energy)
+                }
+                Role::Half(s, i) => {
+                    let energy = self.energy(running, s, i);
+                    (energy / self.pivots[i].low.sqrt(), energy)
+                }
+                Role::Solution(s, i) => {
+                    let energy = self.energy(running, s, 0);
+                    (self.mobility[i] * energy, energy)
+                }
+                _ => (f64::INFINITY, 0.0),
+            };
+            for p in 0..2 {
+                self.add(running, role, self.local(role, k, so_far, p), p);
+                deviation[p] = deviation[p].min(infinite(self.bound(running, role, energy, p)));
+            }
+            if most.is_finite() {
+                value = value.clamped(most * GROWN);
+            }
+        }
+        let last = self.pivots.len() - 1;
+        for (s, _) in self.given[k].iter().filter(|(_, i)| *i == last) {
+            // y is the right-hand side here, and exact in what follows: how far it is off counts as a residual.
+            (0..2).for_each(|p| running.rho[*s][p] += self.mobility[last] * deviation[p]);
+        }
+        (value, deviation)
+    }
+
+    /// R of what the entries from `first` on give: y of an entry depends on no earlier one.
+    fn energy(&self, running: &Running, s: usize, first: usize) -> f64 {
+        let entries = running.rights[s].iter().zip(&self.mobility).skip(first);
+        entries.map(|(size, mobility)| size * mobility).sum::<f64>() * GROWN
+    }
+
+    /// The range of an entry of a right-hand side that is mixed with what makes y of it: all of y but what has
+    /// an entry of L as a factor, that is, y where every L is zero.
+    fn mixed(&self, k: usize, so_far: SoFar<'_>) -> Interval {
+        let between = &self.between[k];
+        let mut found: Vec<Interval> = Vec::with_capacity(between.len() + 1);
+        for op in between.iter().chain([&k]) {
+            let of = |a: usize| match between.binary_search(&a) {
+                _ if matches!(self.roles[a], Some(Role::Lower(..))) => Interval::point(0.0),
+                Ok(at) => found[at],
+                Err(_) => so_far.values[a],
+            };
+            found.push(match so_far.operations[*op] {
+                Operation::Add(a, b, negative) => of(a).plus(of(b).negated(negative)).widened(0.0),
+                Operation::Mul(a, b) => of(a).times(of(b)).widened(0.0),
+                _ => Interval::within(f64::INFINITY),
+            });
+        }
+        found.pop().unwrap_or(Interval::within(f64::INFINITY))
+    }
+
+    /// What an operation with a role is off if factors and results of its solve are taken as they were
+    /// computed; and what its operands are off.
+    fn local(&self, role: Role, k: usize, so_far: SoFar<'_>, p: usize) -> [f64; 2] {
+        let between = &self.between[k];
+        let mut found: Vec<f64> = Vec::with_capacity(between.len());
+        for (at, op) in between.iter().enumerate() {
+            let own = |a, with| self.own(role, (a, with), (&between[..at], &found), so_far.deviations, p);
+            found.push(self.moved(*op, so_far, own, p));
+        }
+        let own = |a, with| self.own(role, (a, with), (between, &found), so_far.deviations, p);
+        let operands = match so_far.operations[k] {
+            Operation::Mul(a, b) => own(a, Some(b)) + own(b, Some(a)),
+            Operation::Div(_, b) => own(b, None),
             _ => 0.0,
         };
-        let bound = |p: usize| {
-            // Of the last row nothing was added before.
-            let operands = match operation {
-                Operation::Mul(a, b) => running.local[a][p] + running.local[b][p],
-                Operation::Div(_, b) => running.local[b][p],
-                _ => 0.0,
-            };
-            self.add(running, role, [local[p], operands], p);
-            deviation[p].min(infinite(self.bound(running, role, energy, p)))
+        [self.moved(k, so_far, own, p), operands]
+    }
+
+    /// How far an operand of `role` is off beyond what is taken as it was computed; `with` is the other factor
+    /// where it is one of a product.
+    fn own(
+        &self,
+        role: Role,
+        (a, with): (usize, Option<usize>),
+        (between, found): (&[usize], &[f64]),
+        all: &[Errors],
+        p: usize,
+    ) -> f64 {
+        let solve = match role {
+            Role::Right(s, i) if self.rights[s][i] == Right::At(a) => return all[a][p],
+            Role::Right(s, _) | Role::Half(s, _) | Role::Solution(s, _) => Some(s),
+            _ => None,
         };
-        let bounds = [0, 1].map(bound);
-        (if most.is_finite() { value.clamped(most * GROWN) } else { value }, bounds)
+        // The last entry of y may be a part of other entries of a right-hand side: there it is not times L.
+        let is_y = |s: usize| self.given[a].iter().any(|(t, i)| *t == s && i + 1 == self.pivots.len());
+        let by_factor = with.and_then(|b| self.roles[b]);
+        let times_factor = matches!(by_factor, Some(Role::Lower(..) | Role::OfPivot(_)));
+        let is_exact = match self.roles[a] {
+            Some(Role::Pivot(_) | Role::OfPivot(_) | Role::Scaled(..) | Role::Lower(..)) => true,
+            Some(Role::Right(t, _) | Role::Half(t, _) | Role::Solution(t, _)) if solve == Some(t) => true,
+            _ => times_factor && solve.is_some_and(is_y),
+        };
+        match between.binary_search(&a) {
+            _ if is_exact => 0.0,
+            Ok(at) => found[at],
+            Err(_) => all[a][p],
+        }
+    }
+
+    /// What an operation is off where its operands are off by `own`.
+    fn moved(&self, k: usize, so_far: SoFar<'_>, own: impl Fn(usize, Option<usize>) -> f64, p: usize) -> f64 {
+        let SoFar { operations, values, deviations, errors } = so_far;
+        let size = |a: usize| values[a].magnitude() + deviations[a][p];
+        let moved = match operations[k] {
+            Operation::Add(a, b, _) => own(a, None) + own(b, None),
+            Operation::Mul(a, b) => {
+                let (x, y) = (own(a, Some(b)), own(b, Some(a)));
+                size(a) * y + size(b) * x + x * y
+            }
+            Operation::Div(a, b) => {
+                let least = values[b].low.abs().min(values[b].high.abs()) - deviations[b][p];
+                let off = own(b, None);
+                let apart = least - off;
+                let moved = own(a, None) + (size(a) / least) * off;
+                if least > 0.0 && apart > 0.0 { moved / apart } else { f64::INFINITY }
+            }
+            _ => 0.0,
+        };
+        infinite((moved + errors[k][p]) * GROWN)
     }
 
     /// What an operation adds to η or ρ.
@@ -163,7 +288,8 @@ impl Solves {
             Role::OfPivot(i) => running.eta[p] += b[i] * b[i] * operands,
             Role::Right(s, i) => running.rho[s][p] += b[i] * local,
             Role::Solution(s, i) => running.rho[s][p] += self.pivots[i].high.sqrt() * local,
-            Role::Half(..) => {}
+            // What y is off that has no role.
+            Role::Half(s, i) => running.rho[s][p] += b[i] * operands,
         }
     }
 
@@ -205,28 +331,34 @@ impl Solves {
     }
 }
 
-/// What an operation is off if those in `before` are taken as off by that alone.
-fn local(
-    operation: Operation,
-    p: usize,
-    before: &[Errors],
-    rounds: f64,
-    (values, deviations): (&[Interval], &[Errors]),
-) -> f64 {
-    let size = |a: usize| values[a].magnitude() + deviations[a][p];
-    let own = |a: usize| before[a][p];
-    let moved = match operation {
-        Operation::Add(a, b, _) => own(a) + own(b),
-        Operation::Mul(a, b) => size(a) * own(b) + size(b) * own(a) + own(a) * own(b),
-        Operation::Div(a, b) => {
-            let least = values[b].low.abs().min(values[b].high.abs()) - deviations[b][p];
-            let apart = least - own(b);
-            let moved = own(a) + (size(a) / least) * own(b);
-            if least > 0.0 && apart > 0.0 { moved / apart } else { f64::INFINITY }
-        }
-        _ => 0.0,
+/// By operation with a role those between it and other roles, in order: what reads a role, or `is_y`, and has
+/// none.
+fn between(
+    operations: &[Operation],
+    roles: &[Option<Role>],
+    is_y: impl Fn(usize) -> bool,
+) -> Vec<Vec<usize>> {
+    let operands = |k: usize| match operations[k] {
+        Operation::Add(a, b, _) | Operation::Mul(a, b) | Operation::Div(a, b) => vec![a, b],
+        _ => Vec::new(),
     };
-    infinite((moved + rounds) * GROWN)
+    let mut is_between = vec![false; operations.len()];
+    for k in 0..operations.len() {
+        let reads = |a: &usize| roles[*a].is_some() || is_y(*a) || is_between[*a];
+        is_between[k] = roles[k].is_none() && operands(k).iter().any(reads);
+    }
+    let of = |k: usize| {
+        let (mut found, mut open) = (Vec::new(), operands(k));
+        while let Some(a) = open.pop() {
+            if is_between[a] && !found.contains(&a) {
+                found.push(a);
+                open.extend(operands(a));
+            }
+        }
+        found.sort_unstable();
+        found
+    };
+    (0..operations.len()).map(|k| if roles[k].is_some() { of(k) } else { Vec::new() }).collect()
 }
 
 /// More than a product with a rounded reciprocal is off, as a share of itself.
@@ -272,7 +404,8 @@ impl<'a> Recognised<'a> {
     fn new(exact: &'a Exact, operations: &'a [Operation], values: &'a [Fp]) -> Self {
         let mut draws = Draws::new(0x656e_6572_6779);
         let n = exact.n;
-        let lower: Vec<Fp> = (0..n * n).map(|_| draws.element()).collect();
+        let number = |l: &Fp| if *l == Fp::ZERO { Fp::ZERO } else { draws.element() };
+        let lower: Vec<Fp> = exact.lower.iter().map(number).collect();
         let mut pivots: Vec<Fp> = (0..n).map(|_| draws.element()).collect();
         let mut factors = FxHashMap::default();
         let inverse = |x: Fp| x.inverse().unwrap_or(Fp::ZERO);
@@ -359,7 +492,7 @@ impl<'a> Recognised<'a> {
     }
 
     /// Gives the operations of a solve their roles; returns the right-hand side.
-    fn solve(&mut self, s: usize) -> Vec<Option<usize>> {
+    fn solve(&mut self, s: usize) -> Vec<Right> {
         let Exact { n, b, lower, pivots, solutions } = self.exact;
         let n = *n;
         let x = &solutions[s];
@@ -375,7 +508,8 @@ impl<'a> Recognised<'a> {
             let term = |k: usize| self.lower[k * n + i] * numbers[0][k];
             let side = right[i] - sum(&term, i + 1..n);
             numbers[0][i] = self.number(half[i] * pivots[i], side);
-            let (role, side) = (Some(Role::Right(s, i)), (i + 1 < n).then_some(side));
+            // The last one is the right-hand side, however that is computed.
+            let (role, side) = ((i + 1 < n).then_some(Role::Right(s, i)), (i + 1 < n).then_some(side));
             stand(&mut map, half[i] * pivots[i], role, side, numbers[0][i]);
         }
         for i in 0..n {
@@ -395,9 +529,10 @@ impl<'a> Recognised<'a> {
             stand(&mut given, *r, None, None, *r);
         }
         self.replace(&[map, given]);
-        let place = |r: &Fp| {
-            let same = |v: &Fp| *r != Fp::ZERO && (*v == *r || -*v == *r);
-            self.values.iter().position(same)
+        let place = |r: &Fp| match self.values.iter().position(|v| *v == *r || -*v == *r) {
+            _ if *r == Fp::ZERO => Right::Zero,
+            Some(k) => Right::At(k),
+            None => Right::Mixed,
         };
         right.iter().map(place).collect()
     }
@@ -475,13 +610,14 @@ mod tests {
             let rho = mobility[1] * residual[1].abs() + pivots_moved[2].sqrt() * late[2].abs();
             let solves = Solves {
                 roles: Vec::new(),
+                between: Vec::new(),
+                given: Vec::new(),
                 rights: vec![Vec::new()],
-                is_right: Vec::new(),
                 pivots: pivots.iter().map(|d| Interval::point(*d)).collect(),
                 diagonal: (0..3).map(|i| b[(i, i)]).collect(),
                 mobility,
             };
-            let running = Running { eta: [eta; 2], rho: vec![[rho; 2]], local: Vec::new() };
+            let running = Running { eta: [eta; 2], rho: vec![[rho; 2]], ..solves.start() };
             let y = |lower: &Matrix3<f64>, r: Vector3<f64>| lower.transpose().try_inverse().unwrap() * r;
             let (y_0, y_1) = (y(&lower, right), y(&lower_moved, right + residual));
             let (z_0, z_1) = (y_0.component_div(&pivots), y_1.component_div(&pivots_moved));

@@ -78,7 +78,7 @@ impl<'a> Bounder<'a> {
     }
 
     /// With the same values in the full set: each link is then known as a body, and more arms have bounds of
-    /// functions that divide by pivots of B.
+    /// functions that divide by pivots of B. The bounds hold only if both are values of the same arm.
     #[must_use]
     pub fn with_links(self, values: Option<&'a [f64]>) -> Self {
         Bounder { links: values, ..self }
@@ -133,24 +133,25 @@ impl<'a> Bounder<'a> {
         let Bounder { model, parameters: Some(values), .. } = *self else { return Err(ANY.to_string()) };
         let built = model.function(Function::MassMatrix, SetKind::Minimal).map_err(|e| e.to_string())?;
         let mass = MassMatrix::new(model, &built, limits).ok_or("a parameter has no value")?;
-        let of_bodies = || {
-            let set = model.set(SetKind::Full).ok()?;
-            bodies::factors(model.arm(), set, self.links?, &mass)
+        if let Some(rough) = mass.factors(ROUGH, BOXES) {
+            return Ok(mass.factors(FINE, BOXES).unwrap_or(rough));
+        }
+        let of_bodies = match (self.links, model.set(SetKind::Full)) {
+            (Some(links), Ok(set)) => bodies::factors(model.arm(), set, links, &mass)
+                .map_err(|why| format!("nor do the links as bodies prove it: {why}")),
+            _ => Err("values of every link's ten parameters may prove it".to_string()),
         };
-        let Some(rough) = mass.factors(ROUGH, BOXES).or_else(of_bodies) else {
-            return Err(match self.worst(Function::MassMatrix, values) {
-                Ok((smallest, pose)) if smallest <= 0.0 => format!(
-                    "B(q) is not positive definite with these values: its smallest eigenvalue is \
-                     {smallest:.2e} at q = {pose}"
-                ),
-                Ok((smallest, pose)) => format!(
-                    "B(q) is not proven positive definite within the limits: the smallest eigenvalue that \
-                     was found is {smallest:.2e} at q = {pose}"
-                ),
-                Err(why) => why,
-            });
-        };
-        Ok(mass.factors(FINE, BOXES).unwrap_or(rough))
+        of_bodies.map_err(|why| match self.worst(Function::MassMatrix, values) {
+            Ok((smallest, pose)) if smallest <= 0.0 => format!(
+                "B(q) is not positive definite with these values: its smallest eigenvalue is {smallest:.2e} \
+                 at q = {pose}"
+            ),
+            Ok((smallest, pose)) => format!(
+                "B(q) is not proven positive definite within the limits: the smallest eigenvalue that was \
+                 found is {smallest:.2e} at q = {pose}; {why}"
+            ),
+            Err(why) => why,
+        })
     }
 
     /// The smallest eigenvalue of a symmetric matrix, and at which pose.
