@@ -196,7 +196,7 @@ fn impossible_links(arm: &Arm, set: &ParameterSet, values: &[f64]) -> Vec<String
         let smallest = pseudo_inertia(&v).symmetric_eigenvalues().min();
         let scale = v.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         if smallest < -ROUNDING * scale {
-            reasons.push(format!("link {}: {}", link + 1, why_no_body(&v, smallest)));
+            reasons.push(format!("{}: {}", arm.body_name(link), why_no_body(&v, smallest)));
         }
     }
     reasons

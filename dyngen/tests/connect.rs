@@ -83,6 +83,21 @@ fn a_stay_that_keeps_a_plate_level_is_a_bar() {
     assert_eq!((mimic.joint, mimic.ratio.to_string(), mimic.offset.to_string()), (1, "1".into(), "0".into()));
 }
 
+/// Angles on the way to a bar are rounded as those of the chain are.
+#[test]
+fn rounded_angles_of_a_bar_are_taken_as_meant() {
+    let upright = "<body name=\"stay\" pos=\"0.5 0.03 0.15\">\n        <joint name=\"foot\" axis=\"0 1 0\"/>";
+    let turned = "<body name=\"stay\" pos=\"0.5 0.03 0.15\" euler=\"-1.5708 0 0\">\n        <joint name=\"foot\" \
+                  axis=\"0 0 1\"/>";
+    let [at, turned_at] = ["pos=\"0 0 1.1\"/>", "pos=\"0 -1.1 0\"/>"];
+    assert!(LEVEL.contains(upright) && LEVEL.contains(at));
+    let found = imported(&LEVEL.replacen(upright, turned, 1).replacen(at, turned_at, 1), "hand");
+    let meant = "taken as meant: joint 'foot': roll -1.5708 is -pi/2";
+    assert!(found.notes.iter().any(|note| note.contains(meant)), "{:?}", found.notes);
+    let exact = imported(LEVEL, "hand");
+    assert_eq!(found.arm.bars, exact.arm.bars, "{:?}", found.notes);
+}
+
 #[test]
 fn loops_that_an_arm_file_has_not_are_left_out_with_a_reason() {
     for (from, to, words) in [
@@ -108,6 +123,10 @@ fn loops_that_an_arm_file_has_not_are_left_out_with_a_reason() {
         assert!(found.notes.iter().any(said), "{words}: {:?}", found.notes);
         assert!(found.notes.iter().any(|note| note.contains("joint 'crank' on link")), "{:?}", found.notes);
     }
+    let text = LEVEL.replacen("pos=\"0 0 1.1\"/>", "pos=\"0 0.02 1.1\"/>", 1);
+    let found = imported(&text, "hand");
+    let apart = "line 29: the equality <connect> is left out: its sites are 0.020000 m apart";
+    assert!(found.arm.bars.is_empty() && found.notes.iter().any(|n| n.contains(apart)), "{:?}", found.notes);
     let text = CRANK.replacen("body1=\"rod\"", "body1=\"rot\"", 1);
     let error = import::any(&text, "arm.xml", &Options::default()).unwrap_err().to_string();
     assert!(error.contains("line 35: <connect>: there is no body 'rot'"), "{error}");

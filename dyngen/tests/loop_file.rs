@@ -2,7 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use dyngen::Arm;
+use dyngen::consistency::check;
+use dyngen::{Arm, Model, SetKind};
 
 const CRANK: &str = include_str!("loops/crank.toml");
 const LEVEL: &str = include_str!("loops/level.toml");
@@ -25,6 +26,71 @@ fn either_joint_of_a_loop_may_be_driven() {
     assert!(error.contains("makes joint 3 follow joint 2: ratio = -1, offset = 0"), "{error}");
 }
 
+/// What the first joint of a loop follows besides makes it no follower of the loop's other joint.
+#[test]
+fn the_first_joint_of_a_loop_may_follow_another_joint() {
+    let row = "theta = \"-pi/2\", rotor_ratio = 100 }";
+    let follows = row.replace(" }", ", mimic = { joint = 1, ratio = 2, offset = 0.5 } }");
+    let arm = Arm::parse(&LEVEL.replacen(row, &follows, 1), "arm.toml").unwrap();
+    let second = arm.joints[2].mimic.as_ref().unwrap();
+    let found = (second.joint, second.ratio.to_string(), second.offset.to_string());
+    assert_eq!(found, (0, "-2".into(), "-1/2".into()));
+}
+
+/// Two parallelograms one behind the other: both plates turn with the first joint, in either order of the
+/// loops.
+#[test]
+fn loops_may_follow_each_other() {
+    let chain = r#"
+name = "lamp"
+convention = "modified"
+gravity = [0, 0, -9.81]
+joint = [
+    { kind = "revolute", a = 0, alpha = 0, d = 0.5, theta = 0 },
+    { kind = "revolute", a = 0.3, alpha = "-pi/2", d = 0, theta = 0 },
+    { kind = "revolute", a = 1.1, alpha = 0, d = 0, theta = 0 },
+    { kind = "revolute", a = 0.4, alpha = 0, d = 0, theta = 0 },
+]
+"#;
+    let of = |first: usize, length: f64, pins: &str| {
+        format!(
+            "[[loop]]\njoints = [{first}, {}, {pins}]\nlengths = [{length}, 0.2, {length}, 0.2]\ninner = 0.5\n\
+             outer = 0.5\n",
+            first + 1
+        )
+    };
+    let loops = [of(2, 1.1, "\"a\", \"b\""), of(3, 0.4, "\"c\", \"d\"")];
+    for order in [[0, 1], [1, 0]] {
+        let text = format!("{chain}{}{}", loops[order[0]], loops[order[1]]);
+        let arm = Arm::parse(&text, "arm.toml").unwrap();
+        let follows: Vec<_> =
+            arm.joints.iter().map(|j| j.mimic.as_ref().map(|m| (m.joint, m.ratio.to_string()))).collect();
+        assert_eq!(follows, [None, None, Some((1, "-1".into())), Some((1, "1".into()))]);
+    }
+    let text = format!("{chain}{}{}", loops[0], loops[1].replace("\"c\", \"d\"", "\"a\", \"b\""));
+    let error = Arm::parse(&text, "arm.toml").unwrap_err().to_string();
+    assert!(error.contains("loop 2: the name 'a-b' is already that of another bar"), "{error}");
+}
+
+/// A bar whose values no body has is called by its name, and so is a link by its number.
+#[test]
+fn a_bar_is_called_by_its_name() {
+    let model = Model::derive(Arm::parse(CRANK, "arm.toml").unwrap()).unwrap();
+    let set = model.set(SetKind::Full).unwrap();
+    let mut values = vec![0.0; set.parameters.len()];
+    for (name, reason) in
+        [("m5", "bar tail-rod end: its mass -1 is negative"), ("m3", "link 3: its mass -1 is")]
+    {
+        let at = set.parameters.iter().position(|p| p.name == name).unwrap();
+        values[at] = -1.0;
+        let found = check(&model, SetKind::Full, &values).unwrap();
+        assert!(found.reasons.iter().any(|r| r.starts_with(reason)), "{:?}", found.reasons);
+    }
+    let arm = model.arm();
+    let last: Vec<Option<usize>> = (0..arm.bodies()).map(|body| arm.last_joint(body)).collect();
+    assert_eq!(last, [Some(0), Some(1), Some(2), Some(3), Some(2), Some(2)]);
+}
+
 #[test]
 fn loops_that_are_none_are_reported() {
     let cases = [
@@ -45,6 +111,26 @@ fn loops_that_are_none_are_reported() {
         (CRANK, "inner = \"pi\"", "", "the key 'inner' is missing"),
         (CRANK, "outer = \"pi\"", "outer = \"half\"", "outer: 'half' is not an angle"),
         (CRANK, "outer = \"pi\"", "outer = \"pi\"\nbar = [{}, {}, {}]", "3 tables [[loop.bar]]"),
+        (
+            CRANK,
+            "outer = \"pi\"",
+            "outer = \"pi\"\nbar = { }",
+            "write [[loop.bar]] with two brackets: each bar",
+        ),
+        (
+            CRANK,
+            "outer = \"pi\"",
+            "outer = \"pi\"\nbar = 2",
+            "bar must be a list of tables: write [[loop.bar]]",
+        ),
+        (CRANK, "outer = \"pi\"", "outer = \"pi\"\nbar = [2]", "bar 1 must be a table: write [[loop.bar]]"),
+        (
+            CRANK,
+            "outer = \"pi\"",
+            "outer = \"pi\"\nbar = [{ name = \"rod\" }, { name = \"rod\" }]",
+            "loop 1: the name 'rod' is already that of another bar",
+        ),
+        (CRANK, "outer = \"pi\"", "outer = \"pi\"\nbar = [{ zero = [\"Im\"] }]", "bars have none"),
         (
             CRANK,
             "outer = \"pi\"",

@@ -63,6 +63,7 @@ impl Bench {
         Ok(Side {
             name: format!("seed {seed}"),
             arm: "virtual".into(),
+            bars: Vec::new(),
             parameters: found.parameters,
             friction: found.friction,
             uncertainty: Some(Uncertainty::of(self.body.names(), &solution, &errors)),

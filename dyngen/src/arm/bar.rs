@@ -33,6 +33,17 @@ impl Arm {
         self.bars.get(body.checked_sub(self.links())?)
     }
 
+    /// A body in words: `link 3`, or a bar by its name.
+    pub fn body_name(&self, body: usize) -> String {
+        self.bar(body).map_or_else(|| format!("link {}", body + 1), |bar| format!("bar {}", bar.name))
+    }
+
+    /// The last joint that moves a body, from 0: a link's own, and of a bar that of the links that it hangs
+    /// on. `None` where none does.
+    pub fn last_joint(&self, body: usize) -> Option<usize> {
+        self.bar(body).map_or(Some(body), |bar| bar.carrier.max(bar.parallel))
+    }
+
     /// The parameters of a body that are declared zero.
     ///
     /// # Panics
@@ -53,7 +64,12 @@ impl Arm {
         if self.bars.is_empty() {
             return Ok(());
         }
-        let names: Vec<String> = self.bars.iter().map(|bar| format!("'{}'", bar.name)).collect();
-        Err(format!("{who} knows no bars of closed loops: the arm file's [[loop]] has {}", names.join(", ")))
+        let names = self.bar_names();
+        Err(format!("{who} knows no bars of closed loops: the arm file's [[loop]] has {names}"))
+    }
+
+    /// The names of its bars, for messages.
+    pub fn bar_names(&self) -> String {
+        self.bars.iter().map(|bar| format!("'{}'", bar.name)).collect::<Vec<_>>().join(", ")
     }
 }

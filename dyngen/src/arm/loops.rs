@@ -56,9 +56,20 @@ pub(super) fn read(
             let own = found.bars(convention, joints);
             described(reader, t, own)
         });
-        match found {
-            Some(own) => bars.extend(own),
-            None => sound = false,
+        let Some(own) = found else {
+            sound = false;
+            continue;
+        };
+        for bar in own {
+            if bars.iter().any(|other: &Bar| other.name == bar.name) {
+                let message = format!(
+                    "{}: the name '{}' is already that of another bar: give each its own in [[loop.bar]]",
+                    t.place, bar.name
+                );
+                reader.errors.error(t.span.clone(), message);
+                sound = false;
+            }
+            bars.push(bar);
         }
     }
     sound.then_some(bars)
@@ -200,14 +211,15 @@ fn tie(joints: &mut [Joint], convention: Convention, found: &Loop) -> Result<(),
     let offset = wrapped(&Angle::sum(&terms));
     let outer = Mimic { joint: a, ratio: minus.clone(), offset: offset.clone() };
     let inner = Mimic { joint: b, ratio: minus, offset: one * offset };
-    let (follower, right) = if joints[a].mimic.is_some() { (a, inner) } else { (b, outer) };
+    let follows_outer = joints[a].mimic.as_ref().is_some_and(|mimic| mimic.joint == b);
+    let (follower, right) = if follows_outer { (a, inner) } else { (b, outer) };
     let Some(said) = &joints[follower].mimic else {
         joints[follower].mimic = Some(right);
         return Ok(());
     };
     let apart = to_f64(&(&said.offset - &right.offset)) / TAU;
     let same = said.joint == right.joint && said.ratio == right.ratio && (apart - apart.round()).abs() < SAME;
-    if same && joints[a + b - follower].mimic.is_none() {
+    if same {
         return Ok(());
     }
     Err(format!(
@@ -340,7 +352,7 @@ impl Loop {
 
 /// The bars with the names and the symmetries that the file gives them.
 fn described(reader: &mut Reader<'_>, t: &Table<'_, '_>, mut bars: Vec<Bar>) -> Option<Vec<Bar>> {
-    let tables = reader.tables(t, "bar");
+    let tables = reader.tables(t, "loop.bar");
     if tables.len() > bars.len() {
         let (span, count) = (tables[bars.len()].span.clone(), bars.len());
         let message = format!(

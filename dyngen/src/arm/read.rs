@@ -294,8 +294,8 @@ impl Reader<'_> {
                     self.errors.error(
                         item.span(),
                         format!(
-                            "{place}: Im is no inertial parameter of the \
-                        link: leave rotor_ratio out where the joint has no rotor"
+                            "{place}: Im is the rotor's and no inertial parameter of the body: leave \
+                             rotor_ratio out where a joint has no rotor; bars have none"
                         ),
                     );
                 }

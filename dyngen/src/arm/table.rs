@@ -113,12 +113,14 @@ impl Reader<'_> {
         }
     }
 
-    pub(super) fn tables<'d, 'i>(&mut self, t: &Table<'d, 'i>, key: &str) -> Vec<Table<'d, 'i>> {
+    /// The tables of a list, by its header in the file: that of a list within another one names both.
+    pub(super) fn tables<'d, 'i>(&mut self, t: &Table<'d, 'i>, header: &str) -> Vec<Table<'d, 'i>> {
+        let key = last_key(header);
         let Some(value) = t.table.get(key) else { return Vec::new() };
         let Some(list) = value.get_ref().as_array() else {
             let message = match value.get_ref().is_table() {
-                true => two_brackets(key),
-                false => format!("{key} must be a list of tables: write [[{key}]]"),
+                true => two_brackets(header),
+                false => format!("{key} must be a list of tables: write [[{header}]]"),
             };
             self.errors.error(value.span(), message);
             return Vec::new();
@@ -131,7 +133,7 @@ impl Reader<'_> {
                 }
                 None => self
                     .errors
-                    .error(item.span(), format!("{key} {} must be a table: write [[{key}]]", i + 1)),
+                    .error(item.span(), format!("{key} {} must be a table: write [[{header}]]", i + 1)),
             }
         }
         tables
@@ -160,6 +162,10 @@ pub(super) fn describe(v: &Value<'_>) -> String {
 }
 
 /// What a table in one bracket should be.
-pub(super) fn two_brackets(key: &str) -> String {
-    format!("write [[{key}]] with two brackets: each {key} is one entry of a list")
+pub(super) fn two_brackets(header: &str) -> String {
+    format!("write [[{header}]] with two brackets: each {} is one entry of a list", last_key(header))
+}
+
+fn last_key(header: &str) -> &str {
+    header.rsplit('.').next().unwrap_or(header)
 }

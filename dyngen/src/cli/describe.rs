@@ -355,7 +355,8 @@ fn symmetry_table(t: &mut String, model: &Model, symmetries: &[Symmetry], digits
 fn set_table(t: &mut String, model: &Model, set: &ParameterSet, digits: Digits) {
     let meaning = match set.kind {
         SetKind::Minimal => "exact for the numbers in the file",
-        SetKind::Symbolic => "exact for every length and ratio",
+        SetKind::Symbolic if model.arm().bars.is_empty() => "exact for every length and ratio",
+        SetKind::Symbolic => "exact for every length and ratio; pins of bars are numbers",
         _ => "the file's grouping",
     };
     let _ =

@@ -61,7 +61,7 @@ enum Command {
 enum Set {
     /// Exact for the numbers in the file.
     Minimal,
-    /// Exact for every size of the arm.
+    /// Exact for every size of the arm; pins of bars are numbers.
     Symbolic,
     /// The file's [[grouping]].
     Published,

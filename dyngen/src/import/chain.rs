@@ -23,8 +23,9 @@ pub(crate) struct Chain {
     pub(crate) joints: Vec<ChainJoint>,
     /// Parallelograms that close on it.
     pub(crate) loops: Vec<ChainLoop>,
-    /// The robot's joints from root to tip, those that do not move too.
-    pub(crate) path: Vec<usize>,
+    /// The robot's joints that it is read from, those that do not move too: from root to tip, then those on
+    /// the way to what an equality connects.
+    pub(crate) read: Vec<usize>,
     pub(crate) notes: Vec<String>,
 }
 
@@ -98,7 +99,19 @@ pub(crate) fn chain(robot: &Robot, options: &Options) -> Result<Chain, Vec<Strin
     notes.extend(robot.notes.iter().cloned());
     notes.extend(without_mass(&joints));
     let gravity = robot.gravity.map_or(GRAVITY, Vector3::from);
-    Ok(Chain { name: robot.name.clone(), root, gravity, tip, tip_pose: pose, joints, loops, path, notes })
+    let read = with_ways_to_connects(&tree, path);
+    Ok(Chain { name: robot.name.clone(), root, gravity, tip, tip_pose: pose, joints, loops, read, notes })
+}
+
+/// The joints of a path, then those on the way to what an equality connects.
+fn with_ways_to_connects(tree: &Tree<'_>, mut path: Vec<usize>) -> Vec<usize> {
+    let links = tree.robot.connects.iter().flat_map(|connect| &connect.links);
+    for joint in links.filter_map(|name| tree.path(tree.link(name)?)).flatten() {
+        if !path.contains(&joint) {
+            path.push(joint);
+        }
+    }
+    path
 }
 
 /// The link at the chain's end, and the joints from the root to it; why there is none.

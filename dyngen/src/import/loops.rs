@@ -70,7 +70,16 @@ pub(super) fn close(
     if tied.len() != CORNERS - 1 || tied.iter().any(|j| !seen.turns(*j)) {
         return Err("it closes no loop of four bars on hinges".to_string());
     }
-    let anchor = seen.pose(tree.link(&connect.links[0]).unwrap_or(tree.root)).point(connect.anchor.into());
+    let at = |link: usize, point: [f64; 3]| {
+        seen.pose(tree.link(&connect.links[link]).unwrap_or(tree.root)).point(point.into())
+    };
+    let anchor = at(0, connect.anchor);
+    if let Some(apart) = connect.other.map(|other| (at(1, other) - anchor).norm()).filter(|x| *x > SAME) {
+        return Err(format!(
+            "its sites are {apart:.6} m apart where all joints are at 0: place them at one point, or write \
+             body1, body2 and anchor"
+        ));
+    }
     let mut open: Vec<Pin> = of_bars.iter().map(|j| seen.pin(*j)).collect();
     open.push(Pin {
         name: format!("connect in line {}", connect.line),

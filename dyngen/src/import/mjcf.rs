@@ -187,8 +187,8 @@ impl<'d, 'i> Reader<'d, 'i> {
                 self.robot.notes.push(what);
             }
             Ok(Some(Equality::Connects { bodies, sites, anchor })) => {
-                match self.connect(bodies, sites, anchor) {
-                    Ok((links, anchor)) => self.robot.connects.push(Connect { line, links, anchor }),
+                match self.connect(line, bodies, sites, anchor) {
+                    Ok(connect) => self.robot.connects.push(connect),
                     Err(message) => self.error(node, message),
                 }
             }
@@ -203,19 +203,20 @@ impl<'d, 'i> Reader<'d, 'i> {
         }
     }
 
-    /// The links that a `<connect>` holds together, and the point in the first.
+    /// The links that a `<connect>` holds together, and where.
     fn connect(
         &self,
+        line: u32,
         bodies: [String; 2],
         sites: Option<[String; 2]>,
         anchor: [f64; 3],
-    ) -> Result<([String; 2], [f64; 3]), String> {
+    ) -> Result<Connect, String> {
         let links = &self.robot.links;
         let Some(sites) = sites else {
             let missing = bodies.iter().find(|body| !links.iter().any(|link| link.name == **body));
             return match missing {
                 Some(body) => Err(format!("<connect>: there is no body '{body}'")),
-                None => Ok((bodies, anchor)),
+                None => Ok(Connect { line, links: bodies, anchor, other: None }),
             };
         };
         let of = |site: &String| {
@@ -225,8 +226,8 @@ impl<'d, 'i> Reader<'d, 'i> {
             };
             links.iter().find_map(at).ok_or_else(|| format!("<connect>: there is no site '{site}' on a body"))
         };
-        let ((one, anchor), (other, _)) = (of(&sites[0])?, of(&sites[1])?);
-        Ok(([one, other], anchor))
+        let ((one, anchor), (another, other)) = (of(&sites[0])?, of(&sites[1])?);
+        Ok(Connect { line, links: [one, another], anchor, other: Some(other) })
     }
 
     fn compiler(&mut self, node: Node<'d, 'i>) {

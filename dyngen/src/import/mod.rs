@@ -180,7 +180,7 @@ fn imported(robot: urdf::Robot, source: &Source, options: &Options) -> Result<Im
         chain = meant(&robot, chain, options).map_err(refused)?;
     }
     if options.exact {
-        let snapped = rounding::snapped(&robot, &chain.path, options.angle_tolerance);
+        let snapped = rounding::snapped(&robot, &chain.read, options.angle_tolerance);
         let said = snapped.into_iter().map(|joint| {
             format!("within {:e} rad: {joint} (--angle-tolerance 0 keeps it)", options.angle_tolerance)
         });
@@ -202,7 +202,7 @@ fn imported(robot: urdf::Robot, source: &Source, options: &Options) -> Result<Im
 
 /// The chain with rounded numbers taken for what they were rounded from, which its notes say.
 fn meant(robot: &urdf::Robot, written: chain::Chain, options: &Options) -> Result<chain::Chain, Vec<String>> {
-    let (nearest, moved) = rounding::nearest(robot, &written.path);
+    let (nearest, moved) = rounding::nearest(robot, &written.read);
     let mut chain = chain::chain(&nearest, options)?;
     if !moved.is_empty() {
         let change = Change::between(&written, &chain);

@@ -69,6 +69,8 @@ pub(crate) struct Connect {
     pub(crate) links: [String; 2],
     /// The point in the first link's frame, m.
     pub(crate) anchor: [f64; 3],
+    /// That in the second link's, m, where the file states it: it should be the same.
+    pub(crate) other: Option<[f64; 3]>,
 }
 
 /// What a joint follows: its position is ratio · the other's + offset.

@@ -16,7 +16,7 @@ pub enum SetKind {
     Full,
     /// Exact for the numbers in the file: as many as the rank.
     Minimal,
-    /// Exact for every size of the arm: lengths and ratios are variables.
+    /// Exact for every size of the arm: lengths and ratios are variables. Pins of bars are numbers.
     Symbolic,
     /// The file's `[[grouping]]`.
     Published,

@@ -67,6 +67,7 @@ struct Payload {
     mass: Option<f64>,
     com_in_link: Option<[f64; 3]>,
     link: Option<usize>,
+    bar: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -99,8 +100,9 @@ impl Load {
                 let payload: Payload =
                     serde_json::from_value(named.parameters).map_err(|e| format!("payload: {e}"))?;
                 if let Some(link) = payload.link {
+                    let carrier = payload.bar.map_or(format!("link {link}"), |bar| format!("bar {bar}"));
                     return Err(format!(
-                        "the body that was found is on link {link} and not at the flange: a controller takes \
+                        "the body that was found is on {carrier} and not at the flange: a controller takes \
                          loads at the flange alone"
                     ));
                 }
@@ -369,6 +371,7 @@ mod tests {
         assert_eq!((tensor("1, 0, 0, 1, 0, 3"), tensor("1, 0, 0, 1, 0, -1")), (None, None));
         for (text, reason) in [
             (explained(r#"{"link": 2, "first_moment": [1, 0, 0]}"#), "on link 2"),
+            (explained(r#"{"link": 5, "bar": "rod", "first_moment": [1, 0, 0]}"#), "on bar rod"),
             (explained(r#"{"mass": 2}"#), "not determined"),
             (r#"{"effects": []}"#.to_string(), "no payload"),
             (r#"{"causes": []}"#.to_string(), "do not differ by a load"),

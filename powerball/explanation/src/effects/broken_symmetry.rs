@@ -62,8 +62,7 @@ impl Effect for BrokenSymmetry {
         let arm = context.data.body.arm();
         let on = |parameter: &Parameter| {
             // A bar has no joint of its own: the last one that moves it.
-            let of_bar = arm.bar(parameter.link).map(|bar| bar.carrier.max(bar.parallel).unwrap_or(0));
-            let joint = JointNumber::from_index(of_bar.unwrap_or(parameter.link));
+            let joint = JointNumber::from_index(arm.last_joint(parameter.link).unwrap_or(0));
             Candidate::on(joint, Settings { parameter: *parameter }, zero.len())
         };
         zero.iter().map(on).collect()

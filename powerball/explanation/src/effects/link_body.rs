@@ -73,6 +73,7 @@ pub(super) fn columns(context: &Context<'_>, link: usize, along: Option<[f64; 3]
         return Vec::new();
     }
     let joint = joint(context, link);
+    let joints = context.data.body.arm().last_joint(link).map_or(0, |last| last + 1);
     (0..COLUMNS)
         .map(|c| {
             let mut unit = [0.0; COLUMNS];
@@ -92,7 +93,7 @@ pub(super) fn columns(context: &Context<'_>, link: usize, along: Option<[f64; 3]
                 }
                 (j, Arc::new(values))
             };
-            Column { parts: (0..context.data.dof().min(link + 1)).map(part).collect() }
+            Column { parts: (0..joints).map(part).collect() }
         })
         .collect()
 }

@@ -2,7 +2,7 @@
 //! log or from some time on, to its end or to some time.
 
 use super::link_body::{self, Body};
-use super::windows::{Sums, best_run, by_log, cut, explained, lasting_window};
+use super::windows::{Sums, best_run, by_log, cut, deviance, explained, lasting_window};
 use super::words::{Words, list, number};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part, Window};
 use dyngen::arm::ParameterKind;
@@ -149,14 +149,21 @@ impl Effect for Payload {
     }
 
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
-        let (dof, bodies) = (context.data.dof(), context.data.body.arm().bodies());
+        let arm = context.data.body.arm();
+        let (dof, bodies) = (context.data.dof(), arm.bodies());
         let links = std::iter::once(None).chain((0..dof.saturating_sub(1)).map(Some));
-        let mut found: Vec<(Candidate, f64)> = links.filter_map(|link| search(context, link)).collect();
+        let mut found: Vec<Candidate> = links.filter_map(|link| search(context, link)).collect();
         // A bar of a loop moves much like the link that it turns with: only what no link explains is on it.
-        let most = found.iter().map(|(_, explained)| *explained).fold(0.0, f64::max);
-        let bars = (dof..bodies).filter_map(|bar| search(context, Some(bar)));
-        found.extend(bars.filter(|(_, explained)| *explained > most + context.rule.least_score));
-        found.into_iter().map(|(candidate, _)| candidate).collect()
+        // Weights are those of a residual with the body in it, in which what is left of the body is small:
+        // what is left is compared with what is left, at each joint.
+        let bars: Vec<Candidate> = (dof..bodies).filter_map(|bar| search(context, Some(bar))).collect();
+        if !bars.is_empty() {
+            let base = context.fit.solver();
+            let left = |candidate: &Candidate| deviance(context, &base, &self.columns(context, candidate));
+            let least = found.iter().map(left).fold(deviance(context, &base, &[]), f64::min);
+            found.extend(bars.into_iter().filter(|bar| left(bar) + context.rule.least_score < least));
+        }
+        found
     }
 
     /// One body at a time.
@@ -344,8 +351,8 @@ fn own_inertia(context: &Context<'_>) -> Option<Column> {
     Some(column)
 }
 
-/// When each log has it, as explains most, and which logs share it; and how much it explains.
-fn search(context: &Context<'_>, link: Option<usize>) -> Option<(Candidate, f64)> {
+/// When each log has it, as explains most, and which logs share it.
+fn search(context: &Context<'_>, link: Option<usize>) -> Option<Candidate> {
     let (data, fit) = (context.data, context.fit);
     let settings = Settings { com: None, stays: false, link, inertia: Inertia::OfPoint };
     let columns = columns_of(context, &settings);
@@ -377,9 +384,11 @@ fn search(context: &Context<'_>, link: Option<usize>) -> Option<(Candidate, f64)
     let ends = windows.iter().any(|w| w.to.is_finite());
     let stays = !ends && data.recordings.iter().filter(|r| r.clock >= first).all(|r| keeps(r.log));
     let settings = Settings { stays, ..settings }.into();
-    let mut joints = all_joints(data);
-    joints.truncate(link.map_or(joints.len(), |link| link + 1));
-    Some((Candidate { joints, settings, windows, searched: held.searched }, held.explained))
+    let joints = match link {
+        None => all_joints(data),
+        Some(link) => joints_before(data.body.arm().last_joint(link).map_or(0, |last| last + 1)),
+    };
+    Some(Candidate { joints, settings, windows, searched: held.searched })
 }
 
 /// Whether a run of steps of `step` seconds can be a body that is held.
@@ -524,5 +533,10 @@ impl Search {
 
 /// Every joint of the arm.
 pub(super) fn all_joints(data: &Data<'_>) -> Vec<JointNumber> {
-    (0..data.dof()).map(JointNumber::from_index).collect()
+    joints_before(data.dof())
+}
+
+/// The first joints.
+fn joints_before(end: usize) -> Vec<JointNumber> {
+    (0..end).map(JointNumber::from_index).collect()
 }

@@ -170,6 +170,32 @@ impl Sums {
     }
 }
 
+/// −2 ln of the likelihood of what columns leave of the residual, with the base refitted: n·ln χ² summed over
+/// joints, n the independent samples that a joint counts as. Only differences mean something.
+pub(super) fn deviance(context: &Context<'_>, base: &Solver, columns: &[Column]) -> f64 {
+    let fit = context.fit;
+    let mut products = Added::zero(fit.design.size, columns.len());
+    for (j, residual) in context.residual.iter().enumerate() {
+        products.add_rows(&fit.design, (j, &(0..residual.len())), columns, residual, fit.weights[j]);
+    }
+    let (shares, rest) = products.without_base(base);
+    let x = products.solver(&rest).solve(&products.right);
+    let mut shift = vec![0.0; fit.design.size];
+    for (shares, x) in shares.iter().zip(&x) {
+        shift.iter_mut().zip(shares).for_each(|(sum, share)| *sum += x * share);
+    }
+    let of_joint = |(j, residual): (usize, &Vec<f64>)| {
+        let (mut left, n) = (residual.clone(), fit.weights[j] * dot(residual, residual));
+        left.iter_mut().zip(fit.design.predict(j, &shift)).for_each(|(left, base)| *left += base);
+        for (column, x) in columns.iter().zip(&x) {
+            let own = column.at(j).unwrap_or_default();
+            left.iter_mut().zip(own).for_each(|(left, own)| *left -= x * own);
+        }
+        if n > 0.0 { n * (fit.weights[j] * dot(&left, &left)).ln() } else { 0.0 }
+    };
+    context.residual.iter().enumerate().map(of_joint).sum()
+}
+
 /// How much less of χ² stays of a residual without the torque of some columns, and the χ² of that torque
 /// itself: by block.
 pub(super) fn explained(

@@ -2,6 +2,7 @@
 
 use super::differences::{Differences, Inertia};
 use super::result::{Body, Cause};
+use super::side::Side;
 use crate::estimate::Solver;
 use crate::estimate::distribution::f_tail;
 use dyngen::arm::sum::parse_sum;
@@ -14,12 +15,12 @@ use faer::Mat;
 const PAYLOAD_LEAVES: f64 = 0.05;
 
 /// The causes of the differences, the inertial ones first; empty if there are none.
-pub(super) fn causes(joints: usize, found: &Differences) -> Vec<Cause> {
+pub(super) fn causes(side: &Side, found: &Differences) -> Vec<Cause> {
     let mut causes = Vec::new();
     let inertial: Vec<String> =
         found.parameters.iter().filter(|p| p.differs).map(|p| p.name.clone()).collect();
     if !inertial.is_empty() {
-        causes.push(payload(joints, found).unwrap_or(Cause::Inertia { parameters: inertial.clone() }));
+        causes.push(payload(side, found).unwrap_or(Cause::Inertia { parameters: inertial.clone() }));
     }
     for f in found.friction.iter().filter(|f| f.differs) {
         causes.push(Cause::Friction { joint: f.joint, change: f.change });
@@ -35,20 +36,28 @@ pub(super) fn causes(joints: usize, found: &Differences) -> Vec<Cause> {
 }
 
 /// The link of which ten inertial parameters explain all that differs, where there is one: the last where it
-/// does so nearly as well as the best.
-fn payload(joints: usize, found: &Differences) -> Option<Cause> {
+/// does so nearly as well as the best. A bar of a closed loop only where no link does.
+fn payload(side: &Side, found: &Differences) -> Option<Cause> {
+    // The minimal set, whose parameters say in their names what they are sums of.
+    let sums: Vec<Vec<(Parameter, f64)>> = found
+        .parameters
+        .iter()
+        .map(|p| Some(parse_sum(&p.name).ok()?.into_iter().map(|(p, c)| (p, to_f64(&c))).collect()))
+        .collect::<Option<_>>()?;
+    let links = side.friction.len();
+    // Bodies behind the links are bars.
+    let bodies = sums.iter().flatten().map(|(p, _)| p.link + 1).fold(links, usize::max);
     let loads: Vec<Load> =
-        (0..joints).rev().filter_map(|link| Load::of(link, link + 1 == joints, found)).collect();
+        (0..links).rev().chain(links..bodies).filter_map(|body| Load::of(body, &sums, found)).collect();
     let least = loads.iter().map(|load| load.left).reduce(f64::min)?;
     let load = loads.iter().find(|load| load.left <= AS_WELL * least)?;
-    load.is_enough(found).then(|| load.cause())
+    load.is_enough(found).then(|| load.cause(side))
 }
 
-/// The part of the inertial difference that a body on a link explains.
+/// The part of the inertial difference that a body on a link or on a bar explains.
 struct Load {
+    /// The link, or the bar after them, from 0.
     link: usize,
-    /// Whether it is the last one.
-    last: bool,
     /// By parameter of a body: its value and its variance, if the logs determine it.
     values: Vec<Option<[f64; 2]>>,
     /// χ² of the difference, and what of it is left.
@@ -68,14 +77,8 @@ fn of_a_body() -> impl Iterator<Item = ParameterKind> {
 }
 
 impl Load {
-    /// By generalised least squares over the minimal set, whose parameters say in their names what they are
-    /// sums of.
-    fn of(link: usize, last: bool, found: &Differences) -> Option<Load> {
-        let sums: Vec<Vec<(Parameter, f64)>> = found
-            .parameters
-            .iter()
-            .map(|p| Some(parse_sum(&p.name).ok()?.into_iter().map(|(p, c)| (p, to_f64(&c))).collect()))
-            .collect::<Option<_>>()?;
+    /// By generalised least squares over the minimal set.
+    fn of(link: usize, sums: &[Vec<(Parameter, f64)>], found: &Differences) -> Option<Load> {
         let column = |kind: ParameterKind| -> Vec<f64> {
             let own = |(p, factor): &(Parameter, f64)| {
                 if p.link == link && p.kind == kind { *factor } else { 0.0 }
@@ -96,7 +99,7 @@ impl Load {
         let variances = solver.inverse_diagonal();
         let value = |k: usize| solver.kept().contains(&k).then(|| [load[k], variances[k]]);
         let values = (0..columns.len()).map(value).collect();
-        Some(Load { link, last, values, all, left, free, solver })
+        Some(Load { link, values, all, left, free, solver })
     }
 
     fn is_enough(&self, found: &Differences) -> bool {
@@ -104,13 +107,16 @@ impl Load {
             || f_tail(self.left / self.free, self.free, found.inertia.freedom) >= found.level
     }
 
-    fn cause(&self) -> Cause {
+    fn cause(&self, side: &Side) -> Cause {
         let value = |kind: ParameterKind| self.values[of_a_body().position(|k| k == kind)?];
         let mass = value(ParameterKind::M).map(|[mass, variance]| [mass, variance.sqrt()]);
         let moments = [ParameterKind::Mx, ParameterKind::My, ParameterKind::Mz];
         let square: f64 = moments.into_iter().filter_map(value).map(|[moment, _]| moment * moment).sum();
-        let body = if self.last { self.body() } else { None };
-        Cause::Payload { link: self.link + 1, mass, first_moment: square.sqrt(), body }
+        let links = side.friction.len();
+        let body = if self.link + 1 == links { self.body() } else { None };
+        let number = || (self.link + 1).to_string();
+        let bar = self.link.checked_sub(links).map(|bar| side.bars.get(bar).cloned().unwrap_or_else(number));
+        Cause::Payload { link: self.link + 1, bar, mass, first_moment: square.sqrt(), body }
     }
 
     /// All of it, where mass and centre are determined.
@@ -181,19 +187,20 @@ pub(super) fn sentence(found: &Differences, causes: &[Cause]) -> String {
 
 fn in_words(cause: &Cause) -> String {
     match cause {
-        Cause::Payload { link, mass, first_moment, .. } => {
+        Cause::Payload { link, bar, mass, first_moment, .. } => {
+            let carrier = bar.as_ref().map_or_else(|| format!("link {link}"), |bar| format!("bar {bar}"));
             let moment = format!("first moments that the logs determine differ by {first_moment:.3} kg·m");
             match mass {
                 Some([mass, std]) => {
                     let which = if *mass >= 0.0 { "heavier" } else { "lighter" };
                     let mass = mass.abs();
                     format!(
-                        "another payload: link {link} is {mass:.3} kg {which} (standard error {std:.3} kg); \
+                        "another payload: {carrier} is {mass:.3} kg {which} (standard error {std:.3} kg); \
                             its {moment}"
                     )
                 }
                 None => {
-                    format!("another payload: on link {link} {moment}; these logs do not determine its mass")
+                    format!("another payload: on {carrier} {moment}; these logs do not determine its mass")
                 }
             }
         }

@@ -29,7 +29,7 @@ use differences::Differences;
 /// [`CompareError`]: fits of other arms or parameter sets, or without standard errors.
 pub fn compare(a: &Side, b: &Side, options: &CompareOptions) -> Result<Comparison, CompareError> {
     let differences = Differences::new(a, b, options)?;
-    let causes = cause::causes(a.friction.len(), &differences);
+    let causes = cause::causes(a, &differences);
     let sentence = cause::sentence(&differences, &causes);
     let Differences { level, comparisons, parameters, friction, constants, torque, warnings, .. } =
         differences;

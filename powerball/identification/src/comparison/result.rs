@@ -148,10 +148,14 @@ impl TorqueDifference {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "cause", rename_all = "snake_case")]
 pub enum Cause {
-    /// Another body on a link.
+    /// Another body on a link, or on a bar of a closed loop.
     Payload {
-        /// The link, from 1: the last where the difference is as well one of it.
+        /// The link, from 1: the last where the difference is as well one of it. A bar by its number after
+        /// the links, where no link explains the difference as well.
         link: usize,
+        /// The bar's name; its number where the fit does not give one. `None` for a link.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        bar: Option<String>,
         /// How much heavier `b` is, kg, and its standard error, if the logs determine it.
         mass: Option<[f64; 2]>,
         /// The size of the difference of first moments about the link's frame, kg·m: of the parts that the

@@ -18,6 +18,8 @@ pub struct Side {
     pub name: String,
     /// The arm's name.
     pub arm: String,
+    /// The names of its bars of closed loops; empty where the fit does not give them.
+    pub bars: Vec<String>,
     /// The minimal set.
     pub parameters: Vec<ParameterEstimate>,
     /// Friction by joint.
@@ -34,6 +36,8 @@ pub struct Side {
 #[derive(Deserialize)]
 struct File {
     arm: String,
+    #[serde(default)]
+    bars: Vec<String>,
     parameters: Vec<ParameterEstimate>,
     friction: Vec<JointFriction>,
     #[serde(default)]
@@ -50,6 +54,7 @@ impl Side {
         Side {
             name: name.to_string(),
             arm: identified.arm.clone(),
+            bars: identified.bars.clone(),
             parameters: identified.parameters.clone(),
             friction: identified.friction.clone(),
             uncertainty: Some(identified.uncertainty.clone()),
@@ -93,8 +98,8 @@ impl Side {
             }
             _ => None,
         };
-        let File { arm, parameters, friction, unusable } = model;
-        Ok(Side { name, arm, parameters, friction, uncertainty, strokes: Vec::new(), unusable })
+        let File { arm, bars, parameters, friction, unusable } = model;
+        Ok(Side { name, arm, bars, parameters, friction, uncertainty, strokes: Vec::new(), unusable })
     }
 
     /// The covariance of two parameters of the minimal set.

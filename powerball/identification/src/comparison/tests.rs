@@ -1,5 +1,7 @@
 //! Simulated pairs: the virtual arm with its own dynamics, sensors and noise, recorded twice.
 
+mod bars;
+
 use super::strokes::{changes, strokes};
 use super::{Cause, CompareOptions, Comparison, Side, compare};
 use crate::estimate::{
@@ -10,6 +12,7 @@ use chacha20::ChaCha8Rng;
 use dyngen::Arm;
 use powerball_controller::friction::TanhFriction;
 use powerball_logs::chain::Chain;
+use powerball_logs::log::Log;
 use powerball_logs::regression::{DataOptions, RigidArm};
 use powerball_logs::summary::Bands;
 use powerball_virtual_arm::{Body, Dynamics, Plant, lwa4p};
@@ -22,14 +25,21 @@ fn fitted(body: &RigidArm, links: Vec<Body>, friction: Vec<TanhFriction<f64>>, s
     let sensors = lwa4p::plant().unwrap().sensors().clone();
     let plant = Plant::new(Dynamics::new(chain, links).unwrap(), friction, sensors);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let options = DataOptions::default();
-    let mut bands = Bands::new(body, &options);
-    for log in 0..3 {
+    let logs = (0..3).map(|log| {
         let mut draw = || (0..5).map(|_| 0.25 * rng.random_range(-1.0..1.0)).collect();
         let joints = (0..6).map(|_| Harmonics { middle: 0.0, a: draw(), b: draw() }).collect();
         let path = Fourier { fundamental: std::f64::consts::TAU / 10.0, periods: 2, ramp: 1.0, joints };
-        let recording = plant.record(&path.sample(plant.sensors().rate), 0.0, 1000 * seed + log);
-        bands.merge(&reduce_in_bands(body, &recording.log("virtual"), &options).unwrap().0).unwrap();
+        plant.record(&path.sample(plant.sensors().rate), 0.0, 1000 * seed + log).log("virtual")
+    });
+    fitted_to(body, logs, seed)
+}
+
+/// A fit of some logs.
+fn fitted_to(body: &RigidArm, logs: impl Iterator<Item = Log>, seed: u64) -> Side {
+    let options = DataOptions::default();
+    let mut bands = Bands::new(body, &options);
+    for log in logs {
+        bands.merge(&reduce_in_bands(body, &log, &options).unwrap().0).unwrap();
     }
     let solution = solve_in_band(&bands, FrictionKind::Symmetric).solution;
     let errors = standard_errors(&solution);
@@ -39,6 +49,7 @@ fn fitted(body: &RigidArm, links: Vec<Body>, friction: Vec<TanhFriction<f64>>, s
     Side {
         name: format!("seed {seed}"),
         arm: "virtual".into(),
+        bars: body.arm().bars.iter().map(|bar| bar.name.clone()).collect(),
         parameters,
         friction,
         uncertainty,

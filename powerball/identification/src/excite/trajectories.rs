@@ -205,6 +205,9 @@ fn tasks<'m>(
         Some(source) => {
             let found = masses(arm, &models[0], mountings, source, &shape, &limits)?;
             assumed.push(format!("torque: {}", found.origin));
+            if !arm.bars.is_empty() && *source == MassSource::Guess {
+                assumed.push(format!("torque: bars of closed loops ({}) have no mass", arm.bar_names()));
+            }
             assumed.extend(without_torque_limit(arm));
             Some(found)
         }
@@ -217,6 +220,12 @@ fn tasks<'m>(
                     of each other and of the floor; adjoining ones may fold to about {:.0}°",
                 2.0 * ((1.0 + 0.5 * clearance / radius) / 3.0).min(1.0).asin().to_degrees()
             ));
+            if !arm.bars.is_empty() {
+                assumed.push(format!(
+                    "bars of closed loops ({}) are not checked against links and floor",
+                    arm.bar_names()
+                ));
+            }
             for (a, b) in shape.always_touching() {
                 assumed.push(format!(
                     "links {a} and {b} touch in every pose with this radius: their distance is not checked"
@@ -276,4 +285,58 @@ fn without_torque_limit(arm: &Arm) -> Option<String> {
         .collect();
     (!without.is_empty())
         .then(|| format!("the arm file has no torque limit for joint {}", without.join(", ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is not known of the bars of an arm is among what is assumed.
+    #[test]
+    fn bars_are_named_where_they_are_not_checked() {
+        let arm = Arm::parse(
+            r#"
+name = "palletiser"
+convention = "modified"
+gravity = [0, 0, -9.81]
+[[joint]]
+kind = "revolute"
+a = 0
+alpha = "-pi/2"
+d = 0.5
+theta = 0
+position = [-1, 1]
+velocity = 1
+acceleration = 3
+torque = 400
+[[joint]]
+kind = "revolute"
+a = 0.5
+alpha = 0
+d = 0
+theta = 0
+position = [-1, 1]
+velocity = 1
+acceleration = 3
+torque = 100
+[[loop]]
+joints = [2, "tail", "rod end", "crank"]
+lengths = [0.2, 0.5, 0.2, 0.5]
+inner = "pi"
+outer = "pi"
+bar = [{ name = "rod" }, { name = "crank" }]
+"#,
+            "arm.toml",
+        )
+        .unwrap();
+        let models = [Model::derive(arm.clone()).unwrap()];
+        let mut assumed = Vec::new();
+        tasks(&arm, &models, &[Mounting::Filed], &ExciteOptions::default(), &mut assumed).unwrap();
+        for line in [
+            "torque: bars of closed loops ('rod', 'crank') have no mass",
+            "bars of closed loops ('rod', 'crank') are not checked against links and floor",
+        ] {
+            assert!(assumed.iter().any(|a| a == line), "{assumed:#?}");
+        }
+    }
 }

@@ -156,6 +156,7 @@ fn conclude(
     options.progress.say("looking for the nearest real arm");
     Ok(Identified {
         arm: model.arm,
+        bars: body.arm().bars.iter().map(|bar| bar.name.clone()).collect(),
         arm_file: None,
         conventions: None,
         transmission: None,

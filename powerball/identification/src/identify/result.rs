@@ -22,6 +22,9 @@ pub struct Identified {
     pub unusable: Vec<String>,
     /// The arm's name.
     pub arm: String,
+    /// The names of its bars of closed loops.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bars: Vec<String>,
     /// The arm file, as its path was given to the command; `None` for an arm in memory.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub arm_file: Option<String>,

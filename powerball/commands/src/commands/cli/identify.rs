@@ -234,9 +234,8 @@ impl ConsistentCommand {
             distance.join(", ")
         ));
         for link in &found.without_body {
-            output::print(&format!(
-                "note: no body can have the symmetries that the file declares of link {link}"
-            ));
+            let body = arm.body_name(link - 1);
+            output::print(&format!("note: no body can have the symmetries that the file declares of {body}"));
         }
         Ok(())
     }
