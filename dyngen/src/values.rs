@@ -14,6 +14,9 @@ use std::path::Path;
 
 mod twice;
 
+/// Of a value with a standard error above this share of it, logs say little.
+const LITTLE: f64 = 0.3;
+
 /// Named values, as a file gives them.
 #[derive(Clone, Debug)]
 pub struct Values {
@@ -22,6 +25,13 @@ pub struct Values {
 }
 
 impl Values {
+    /// Whether logs show a value that cannot be zero: by its standard error, which is in the value's unit and
+    /// `None` where they do not show it alone.
+    #[must_use]
+    pub fn is_shown(value: f64, std: Option<f64>) -> bool {
+        std.is_some_and(|std| std < LITTLE * value.abs())
+    }
+
     /// Reads a file.
     ///
     /// # Errors
@@ -137,8 +147,11 @@ impl Values {
             return self.in_order(&names, &names);
         }
         let kept: Vec<String> = kept.iter().map(ToString::to_string).collect();
-        let needed: Vec<Parameter> =
+        let mut needed: Vec<Parameter> =
             set.parameters.iter().flat_map(|p| p.terms.iter().map(|(q, _)| *q)).collect();
+        // A parameter can stand in several sums.
+        needed.sort();
+        needed.dedup();
         let needed_names: Vec<String> = needed.iter().map(ToString::to_string).collect();
         let values = self.in_order(&needed_names, &kept)?;
         let mut all = vec![0.0; model.arm().all_parameters().len()];

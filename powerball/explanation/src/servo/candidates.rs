@@ -22,18 +22,20 @@ const FADES: f64 = 15.0;
 
 /// Something that a joint may have.
 pub(super) struct Candidate {
-    name: &'static str,
+    pub name: &'static str,
     /// What is fitted in addition, with the least value and where the search may begin; the scale is the
     /// first start.
-    free: Vec<(Constant, f64, &'static [f64])>,
+    pub free: Vec<(Constant, f64, &'static [f64])>,
     /// What is set and not fitted.
-    set: Vec<(Constant, f64)>,
+    pub set: Vec<(Constant, f64)>,
 }
 
-/// Everything that these logs can show of a joint.
-pub(super) fn all(joint: &Joint<'_>, arm: &ServoArm, rule: &Rule) -> Vec<Candidate> {
+/// Everything that these logs can show of a joint: what follows a signal needs it in the logs to fit and in
+/// those that judge.
+pub(super) fn all(joint: &Joint<'_>, arm: &ServoArm, held_out: &[ServoLog], rule: &Rule) -> Vec<Candidate> {
     let of = |name, free| Candidate { name, free, set: Vec::new() };
     let problem = &joint.problem;
+    let judges = problem.in_logs(&arm.body, held_out, problem.joint);
     let mut all = vec![
         of("load_friction", vec![(Constant::Load, 0.0, &[0.1][..])]),
         of(
@@ -46,7 +48,8 @@ pub(super) fn all(joint: &Joint<'_>, arm: &ServoArm, rule: &Rule) -> Vec<Candida
         ),
     ];
     let tracks = problem.tracks();
-    let volts: Option<Vec<&[f64]>> = tracks.iter().map(|track| track.volts).collect();
+    let has_volts = judges.tracks().iter().all(|track| track.volts.is_some());
+    let volts = tracks.iter().map(|track| track.volts.filter(|_| has_volts)).collect::<Option<Vec<_>>>();
     let known = arm.known(problem.joint).servo.supply;
     if let Some(supply) = volts.and_then(|volts| known.or_else(|| mean(&volts.concat()))) {
         let set = vec![(Constant::Supply, supply)];
@@ -56,11 +59,13 @@ pub(super) fn all(joint: &Joint<'_>, arm: &ServoArm, rule: &Rule) -> Vec<Candida
     let ends = tracks.iter().filter_map(|track| Some(track.t.last()? - track.t.first()?));
     let seconds: f64 = ends.sum();
     match tracks.first().and_then(|track| track.temperature?.first()) {
-        Some(cold) if tracks.iter().all(|track| track.temperature.is_some()) => all.push(Candidate {
-            name: "temperature",
-            free: vec![(Constant::Warmth, -1.0, CHANGES)],
-            set: vec![(Constant::Cold, *cold)],
-        }),
+        Some(cold) if tracks.iter().chain(judges.tracks()).all(|of| of.temperature.is_some()) => {
+            all.push(Candidate {
+                name: "temperature",
+                free: vec![(Constant::Warmth, -1.0, CHANGES)],
+                set: vec![(Constant::Cold, *cold)],
+            })
+        }
         // Whatever drifts in a few seconds looks like warmth.
         _ if seconds < rule.least_time => {}
         _ => all.push(of(
@@ -81,6 +86,13 @@ fn mean(signal: &[f64]) -> Option<f64> {
 }
 
 impl Candidate {
+    /// What a fit of it has at the end of what is possible: then that is not the size of anything.
+    fn at_bound(&self, fitted: &Joint<'_>) -> Option<Constant> {
+        let at = |own: &Constant| fitted.problem.roles.iter().position(|role| *role == Role::Constant(*own));
+        let ends = |k: usize| fitted.fitted.values[k] <= fitted.free[k].least;
+        self.free.iter().map(|(constant, ..)| *constant).find(|own| at(own).is_some_and(ends))
+    }
+
     /// The joint with it, from where it is.
     fn fitted<'l>(&self, joint: &Joint<'l>) -> Joint<'l> {
         let full = joint.problem.constants.of(Constant::Torque);
@@ -174,9 +186,15 @@ fn best<'l>(
     let judged = |joint: &Joint<'_>| joint.problem.in_logs(&arm.body, held_out, j);
     let before = block_squares(&judged(joint));
     let total = before.iter().sum::<f64>();
-    let mut tried: Vec<(Joint<'l>, usize, f64, f64)> = Vec::new();
+    let (mut tried, mut rivals) = (Vec::new(), Vec::new());
     for (k, candidate) in candidates.iter().enumerate() {
         let next = candidate.fitted(joint);
+        if let Some(bound) = candidate.at_bound(&next) {
+            let value = next.problem.constants.of(bound);
+            let why_not = format!("its {} ends at its bound, {value}: it is no size", bound.name());
+            rivals.push(ServoRival { effect: candidate.name.to_string(), why_not });
+            continue;
+        }
         let after = block_squares(&judged(&next));
         let left = after.iter().sum::<f64>() / total.max(f64::MIN_POSITIVE);
         tried.push((next, k, left, by_chance(&before, &after)));
@@ -194,10 +212,11 @@ fn best<'l>(
         let percent = [share, left].map(|x| 100.0 * x);
         format!("leaves {:.0} % of the held-out squared error, not {:.0} %", percent[0], percent[1])
     };
-    let rivals = tried.map(|(_, other, share, _)| ServoRival {
+    let others = tried.map(|(_, other, share, _)| ServoRival {
         effect: candidates[other].name.to_string(),
         why_not: why_not(share),
     });
+    rivals.splice(0..0, others);
     let effect = ServoEffect {
         effect: candidates[k].name,
         joints: vec![JointNumber::from_index(j)],
@@ -208,7 +227,7 @@ fn best<'l>(
         probability: 1.0 - p_value,
         logs: Vec::new(),
         leftover: left,
-        rivals: rivals.collect(),
+        rivals,
     };
     Some((best, k, effect))
 }
