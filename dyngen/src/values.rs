@@ -253,6 +253,13 @@ mod tests {
         for (value, expected) in read.iter().zip(&expected) {
             assert!((value - expected).abs() < 1e-9 * expected.abs().max(1.0), "{value} {expected}");
         }
+        // A parameter that stands in several sums is missing once.
+        let kept = upright.arm().kept_parameters();
+        let others = kept.iter().map(ToString::to_string).filter(|name| name != "my3").collect::<Vec<_>>();
+        let others = Values::named(others.iter().map(|name| (name.as_str(), 0.0)), "v.json");
+        let missing = others.of_set(&upright, sets[1]).unwrap_err().to_string();
+        assert!(missing.ends_with("no value for my3"), "{missing}");
+
         let missing = named("mz2 + my3").of_set(&upright, sets[1]).unwrap_err().to_string();
         assert!(missing.contains("no value for Ixz2 + 7/20*mz2 + 7/20*my3"), "{missing}");
     }

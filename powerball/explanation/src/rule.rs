@@ -86,9 +86,9 @@ pub struct Rule {
     /// share is that of an earlier trial on other data. What is in validation logs only must leave no more of
     /// their excess over the fitted logs.
     pub max_unexplained: f64,
-    /// What is more than this share is most of a thing: half. An event of some seconds (a push) must explain most of what its time
-    /// has more of squared error than others; another log has the same push where it has it for most of its
-    /// time; an effect most of which is missing in some octave, by more than
+    /// What is more than this share is most of a thing: half. An event of some seconds (a push) must explain
+    /// most of what its time has more of squared error than others; another log has the same push where it
+    /// has it for most of its time; an effect most of which is missing in some octave, by more than
     /// [`missing_errors`](Self::missing_errors), is not the effect that it is called.
     pub most: f64,
     /// See [`most`](Self::most): standard errors that chance exceeds once in 800,
@@ -111,8 +111,8 @@ pub struct Rule {
     pub same_start: f64,
 
     /// A validation log whose squared error is this many times that of the fitted logs holds something that
-    /// they do not. Of position servos a log is asked for what it has alone from that squared error on; where
-    /// nothing is found it is unlike the others where its rms is as many times theirs.
+    /// they do not. For position servos a mass or a gain is looked for in such a log; where none takes away
+    /// most of its squared error, it is unlike the others from that ratio of the rms on.
     pub odd_log: f64,
     /// A log has the same push if that also explains this share of the force's own torque: a push of another
     /// size or direction is another one.
