@@ -86,11 +86,11 @@ fn mean(signal: &[f64]) -> Option<f64> {
 }
 
 impl Candidate {
-    /// What a fit of it has at the end of what is possible: then that is not the size of anything.
-    fn at_bound(&self, fitted: &Joint<'_>) -> Option<Constant> {
-        let at = |own: &Constant| fitted.problem.roles.iter().position(|role| *role == Role::Constant(*own));
-        let ends = |k: usize| fitted.fitted.values[k] <= fitted.free[k].least;
-        self.free.iter().map(|(constant, ..)| *constant).find(|own| at(own).is_some_and(ends))
+    /// Whether a constant of it ends at its bound: something else is there, and this only resembles it.
+    fn ends_at_bound(&self, fitted: &Joint<'_>) -> bool {
+        let own = |role: &Role| self.free.iter().any(|(constant, ..)| *role == Role::Constant(*constant));
+        let mut values = fitted.problem.roles.iter().zip(&fitted.fitted.values).zip(&fitted.free);
+        values.any(|((role, value), free)| own(role) && *value <= free.least)
     }
 
     /// The joint with it, from where it is.
@@ -186,15 +186,9 @@ fn best<'l>(
     let judged = |joint: &Joint<'_>| joint.problem.in_logs(&arm.body, held_out, j);
     let before = block_squares(&judged(joint));
     let total = before.iter().sum::<f64>();
-    let (mut tried, mut rivals) = (Vec::new(), Vec::new());
+    let mut tried: Vec<(Joint<'l>, usize, f64, f64)> = Vec::new();
     for (k, candidate) in candidates.iter().enumerate() {
         let next = candidate.fitted(joint);
-        if let Some(bound) = candidate.at_bound(&next) {
-            let value = next.problem.constants.of(bound);
-            let why_not = format!("its {} ends at its bound, {value}: it is no size", bound.name());
-            rivals.push(ServoRival { effect: candidate.name.to_string(), why_not });
-            continue;
-        }
         let after = block_squares(&judged(&next));
         let left = after.iter().sum::<f64>() / total.max(f64::MIN_POSITIVE);
         tried.push((next, k, left, by_chance(&before, &after)));
@@ -203,7 +197,7 @@ fn best<'l>(
     let mut tried = tried.into_iter();
     let (best, k, left, p_value) = tried.next()?;
     let is_sure = left <= 1.0 - rule.large_gain || p_value <= level;
-    if left > 1.0 - rule.least_gain || !is_sure {
+    if left > 1.0 - rule.least_gain || !is_sure || candidates[k].ends_at_bound(&best) {
         return None;
     }
     let samples: usize = judged(joint).tracks().iter().map(|track| track.t.len()).sum();
@@ -212,11 +206,10 @@ fn best<'l>(
         let percent = [share, left].map(|x| 100.0 * x);
         format!("leaves {:.0} % of the held-out squared error, not {:.0} %", percent[0], percent[1])
     };
-    let others = tried.map(|(_, other, share, _)| ServoRival {
+    let rivals = tried.map(|(_, other, share, _)| ServoRival {
         effect: candidates[other].name.to_string(),
         why_not: why_not(share),
     });
-    rivals.splice(0..0, others);
     let effect = ServoEffect {
         effect: candidates[k].name,
         joints: vec![JointNumber::from_index(j)],
@@ -227,7 +220,7 @@ fn best<'l>(
         probability: 1.0 - p_value,
         logs: Vec::new(),
         leftover: left,
-        rivals,
+        rivals: rivals.collect(),
     };
     Some((best, k, effect))
 }
