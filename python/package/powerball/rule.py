@@ -111,8 +111,8 @@ class Rule:
     #: Two runs start at the same place where every joint does to this share of its travel in all logs.
     same_start: float = 0.05
     #: A validation log whose squared error is this many times that of the fitted logs holds something that
-    #: they do not. Of position servos a log is asked for what it has alone from that squared error on;
-    #: where nothing is found it is unlike the others where its rms is as many times theirs.
+    #: they do not. For position servos a mass or a gain is looked for in such a log; where none takes away
+    #: most of its squared error, it is unlike the others from that ratio of the rms on.
     odd_log: float = 2.0
     #: A log has the same push if that also explains this share of the force's own torque: a push of another
     #: size or direction is another one.
