@@ -140,23 +140,22 @@ fn a_drive_that_is_switched_off_is_not_judged_by_its_goal() {
     assert!(found.unusable[0].contains("joint 1 is switched off (torque_enable) in all"), "{found:?}");
 }
 
-/// Slow motion of a strong servo shows torque·gain, and neither of both.
+/// Where no log reaches full duty, the standard error of the torque is as large as the torque.
 #[test]
 fn a_torque_that_no_log_reaches_is_not_shown() {
     let arm = pendulum(0.12, "kp = 16");
-    let servos = ServoArm::new(&arm, Some(&point(0.8))).unwrap();
-    let strong = truth().with(Constant::Torque, 60.0).with(Constant::Gain, 0.018);
-    let t: Vec<f64> = (0..600).map(|k| 0.01 * f64::from(k)).collect();
-    let goal = |time: f64| 0.5 * time.max(0.0).sin();
-    let logged: Vec<f64> = t.iter().map(|t| goal(*t)).collect();
-    let q = explicit(&t, |time| linear_at(&t, &logged, time), 1e9, &strong, (0.8, 0.12));
-    let columns = [("t", &t), ("q1", &q), ("goal1", &logged)].map(|(name, x)| (name.into(), x.as_slice()));
-    let log = ServoLog::from_columns("slow", &arm, &columns).unwrap().0;
-    let found = identify_servos(&servos, &[log], &[], Progress::default()).unwrap();
-    let torque = found.servo[0].parameters.iter().find(|p| p.name == "torque").unwrap();
-    assert!(!Values::is_shown(torque.value, torque.std), "{torque:?}");
-    let warned = |warning: &String| warning.contains("do not show") && warning.contains("torque");
-    assert!(found.warnings.iter().any(warned), "{torque:?} {:?}", found.warnings);
+    let (servos, logs) = (ServoArm::new(&arm, Some(&point(0.8))).unwrap(), synthetic(&arm));
+    let mut found = identify_servos(&servos, &logs, &[], Progress::default()).unwrap();
+    let mut joint = Joint::fit(&servos, &logs, 0).unwrap();
+    let torque = |role: &Role| *role == Role::Constant(Constant::Torque);
+    let at = joint.problem.roles.iter().position(torque).unwrap();
+    for (std, hidden) in [(Some(0.25), false), (Some(0.35), true), (Some(40.0), true), (None, true)] {
+        joint.std[at] = std.map(|share| share * joint.fitted.values[at]);
+        found.warnings.clear();
+        report(&mut found, &servos, &joint, 0);
+        let warned = found.warnings.iter().any(|warning| warning.contains("do not show torque alone"));
+        assert_eq!(warned, hidden, "{std:?}: {:?}", found.warnings);
+    }
 }
 
 #[test]
