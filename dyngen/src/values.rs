@@ -14,6 +14,9 @@ use std::path::Path;
 
 mod twice;
 
+/// Of a value with a standard error above this share of it, logs say little.
+const LITTLE: f64 = 0.3;
+
 /// Named values, as a file gives them.
 #[derive(Clone, Debug)]
 pub struct Values {
@@ -22,6 +25,13 @@ pub struct Values {
 }
 
 impl Values {
+    /// Whether logs show a value that cannot be zero: by its standard error, which is in the value's unit and
+    /// `None` where they do not show it alone.
+    #[must_use]
+    pub fn is_shown(value: f64, std: Option<f64>) -> bool {
+        std.is_some_and(|std| std < LITTLE * value.abs())
+    }
+
     /// Reads a file.
     ///
     /// # Errors
@@ -137,8 +147,11 @@ impl Values {
             return self.in_order(&names, &names);
         }
         let kept: Vec<String> = kept.iter().map(ToString::to_string).collect();
-        let needed: Vec<Parameter> =
+        let mut needed: Vec<Parameter> =
             set.parameters.iter().flat_map(|p| p.terms.iter().map(|(q, _)| *q)).collect();
+        // A parameter can stand in several sums.
+        needed.sort();
+        needed.dedup();
         let needed_names: Vec<String> = needed.iter().map(ToString::to_string).collect();
         let values = self.in_order(&needed_names, &kept)?;
         let mut all = vec![0.0; model.arm().all_parameters().len()];
@@ -240,6 +253,13 @@ mod tests {
         for (value, expected) in read.iter().zip(&expected) {
             assert!((value - expected).abs() < 1e-9 * expected.abs().max(1.0), "{value} {expected}");
         }
+        // A parameter that stands in several sums is missing once.
+        let kept = upright.arm().kept_parameters();
+        let others = kept.iter().map(ToString::to_string).filter(|name| name != "my3").collect::<Vec<_>>();
+        let others = Values::named(others.iter().map(|name| (name.as_str(), 0.0)), "v.json");
+        let missing = others.of_set(&upright, sets[1]).unwrap_err().to_string();
+        assert!(missing.ends_with("no value for my3"), "{missing}");
+
         let missing = named("mz2 + my3").of_set(&upright, sets[1]).unwrap_err().to_string();
         assert!(missing.contains("no value for Ixz2 + 7/20*mz2 + 7/20*my3"), "{missing}");
     }

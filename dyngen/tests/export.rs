@@ -201,12 +201,16 @@ fn a_position_servo_is_written_as_mujocos() {
     let changed = write(&own, &servos).text;
     assert!(changed.contains("name=\"lift\"") && !changed.contains("dampratio") && !changed.contains(name));
     assert_eq!(changed.matches("kp=\"24.0\"").count(), 4, "{changed}");
-    // A torque that no log reaches is no limit.
-    let hidden =
-        write(MIXED, &servos.replace("\"value\": 3.0, \"std\": 0.1", "\"value\": 3.0, \"std\": null"));
-    assert!(
-        !hidden.text.contains("forcerange=") && hidden.notes.iter().any(|n| n.contains("no log reaches"))
-    );
+    // A torque that no log reaches is no limit, unless the arm file has it.
+    let torque = |std: &str| servos.replace("3.0, \"std\": 0.1", &format!("3.0, \"std\": {std}"));
+    for std in ["null", "0.95", "695"] {
+        let hidden = write(MIXED, &torque(std));
+        assert!(!hidden.text.contains("forcerange="), "{std}: {}", hidden.text);
+        assert!(hidden.notes.iter().any(|n| n.contains("no log reaches")), "{:?}", hidden.notes);
+    }
+    for std in ["0.85", "null, \"known\": true"] {
+        assert_eq!(write(MIXED, &torque(std)).text.matches(position).count(), 4, "{std}");
+    }
     let shares = read(&servos.replace("\"absolute\": true", "\"absolute\": false")).unwrap_err();
     assert!(shares.contains("s.json: the torques of joint 1 are shares"), "{shares}");
     assert!(

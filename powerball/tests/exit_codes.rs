@@ -171,3 +171,27 @@ fn a_watch_ends_with_what_it_found() {
     assert!(text.lines().all(|line| serde_json::from_str::<serde_json::Value>(line).is_ok()), "{text}");
     assert!(said(&done).contains("changed: "), "{}", said(&done));
 }
+
+/// Every command that takes a torque model says what the result of position servos is for.
+#[test]
+fn a_result_of_servos_is_no_torque_model() {
+    let folder = folder("servos");
+    std::fs::write(folder.join("arm.toml"), arm("0.5", "9.81")).unwrap();
+    std::fs::write(folder.join("b.csv"), log("t,q1,tau1", 0.4)).unwrap();
+    let result = r#"{"unusable": [], "arm": "pendulum", "set": "servo", "parameters": [], "friction": [{"joint": 1,
+        "coulomb": 0.1, "viscous": 0.1, "load": 0.0}], "servo": []}"#;
+    std::fs::write(folder.join("servos.json"), result).unwrap();
+    for command in [
+        "watch --arm arm.toml --model servos.json --log b.csv",
+        "verify --arm arm.toml --model servos.json --log b.csv --out verified",
+        "compare servos.json servos.json --out compared",
+        "generate --arm arm.toml --model servos.json -o controller.rs",
+        "export --for sdf servos.json --arm arm.toml -o arm.sdf",
+    ] {
+        let done = powerball(&folder, command);
+        let why =
+            "servos.json: is of position servos and has no torque model; dyngen export --to mjcf takes it";
+        assert_eq!(code(&done), 2, "{command}: {}", said(&done));
+        assert!(said(&done).contains(why), "{command}: {}", said(&done));
+    }
+}

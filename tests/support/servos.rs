@@ -30,6 +30,17 @@ pub(crate) fn point(mass: f64) -> Values {
     Values::named(std::iter::once(("m1", mass)).chain(zero), "point")
 }
 
+/// A velocity after an explicit step of `h`, s, with Karnopp's stick: a joint rests while dry friction can
+/// hold what drives it, N·m.
+pub(crate) fn karnopp(v: f64, (drive, dry, inertia): (f64, f64, f64), h: f64) -> f64 {
+    let rests = v.abs() < 1e-4;
+    if rests && drive.abs() <= dry {
+        return 0.0;
+    }
+    let way = if rests { drive.signum() } else { v.signum() };
+    v + h * (drive - way * dry) / inertia
+}
+
 /// The set's logs, unpacked into a folder that goes with their last use.
 pub(crate) struct Measured(PathBuf);
 

@@ -4,6 +4,7 @@
 use super::edit::shortest;
 use super::known::Friction;
 use crate::arm::Arm;
+use crate::values::Values;
 use serde_json::Value;
 
 /// The servo of a joint, N, m, rad, s.
@@ -13,7 +14,7 @@ pub struct Servo {
     pub kp: f64,
     /// Torque for each rad/s by the drive.
     pub kv: f64,
-    /// The largest torque, where the logs or the arm file say it.
+    /// The largest torque, where the logs show it ([`Values::is_shown`]) or the arm file has it.
     pub force: Option<f64>,
     /// Rotor and gear as the joint feels them.
     pub armature: f64,
@@ -56,11 +57,11 @@ fn servo(joint: usize, entry: &Value) -> Result<Servo, String> {
     let or = |name: &str, ideal: f64| value(name).unwrap_or(ideal);
     let torque = value("torque").ok_or_else(|| format!("no torque for joint {}", joint + 1))?;
     // Where no log reaches full duty, torque and gain are known as their product.
-    let is_shown =
-        std("torque").is_some() || found("torque").is_some_and(|p| p["known"] == Value::Bool(true));
+    let is_known = found("torque").is_some_and(|p| p["known"] == Value::Bool(true));
+    let has_force = is_known || Values::is_shown(torque, std("torque"));
     let stiffness = torque * or("gain", 1.0);
     let mut left_out = Vec::new();
-    if !is_shown {
+    if !has_force {
         left_out.push("forcerange: no log reaches the largest torque".to_string());
     }
     for (name, words) in [
@@ -79,7 +80,7 @@ fn servo(joint: usize, entry: &Value) -> Result<Servo, String> {
     Ok(Servo {
         kp: stiffness * or("kp", 1.0),
         kv: stiffness * or("kd", 0.0),
-        force: is_shown.then(|| torque * or("pwm_limit", 1.0)),
+        force: has_force.then(|| torque * or("pwm_limit", 1.0)),
         armature: or("armature", 0.0),
         friction: Friction {
             viscous: Some(or("viscous", 0.0) + or("back_emf", 0.0)),

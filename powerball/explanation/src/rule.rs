@@ -33,7 +33,8 @@ pub struct Rule {
     pub worst_fold: f64,
 
     /// What lowers the squared error of its joints by this share, on the validation set and the other way
-    /// round, needs no folds: a tenth of the rms.
+    /// round, needs no folds: a tenth of the rms. What position servos lack on all logs needs no significance
+    /// where it lowers that of the validation set by this share: few seconds of it are too few blocks.
     pub large_gain: f64,
     /// … where either way adds the same: their correlation.
     pub least_correlation: f64,
@@ -85,9 +86,9 @@ pub struct Rule {
     /// share is that of an earlier trial on other data. What is in validation logs only must leave no more of
     /// their excess over the fitted logs.
     pub max_unexplained: f64,
-    /// Half, and more than it is most. An event of some seconds (a push) must explain most of what its time
-    /// has more of squared error than others; another log has the same push where it has it for most of its
-    /// time; an effect most of which is missing in some octave, by more than
+    /// What is more than this share is most of a thing: half. An event of some seconds (a push) must explain
+    /// most of what its time has more of squared error than others; another log has the same push where it
+    /// has it for most of its time; an effect most of which is missing in some octave, by more than
     /// [`missing_errors`](Self::missing_errors), is not the effect that it is called.
     pub most: f64,
     /// See [`most`](Self::most): standard errors that chance exceeds once in 800,
@@ -110,7 +111,8 @@ pub struct Rule {
     pub same_start: f64,
 
     /// A validation log whose squared error is this many times that of the fitted logs holds something that
-    /// they do not.
+    /// they do not. For position servos a mass or a gain is looked for in such a log; where none takes away
+    /// most of its squared error, it is unlike the others from that ratio of the rms on.
     pub odd_log: f64,
     /// A log has the same push if that also explains this share of the force's own torque: a push of another
     /// size or direction is another one.
@@ -122,7 +124,7 @@ pub struct Rule {
     pub coloured: f64,
 
     /// A joint is predicted where no more than this share of its torque's rms is left on the validation set.
-    /// Where no more than this share is not left, a model predicts next to nothing.
+    /// Where more than 1 less this share is left, a model predicts next to nothing.
     pub predicted_share: f64,
     /// What is left of a joint below this share of its torque needs no name, whatever it depends on: a law
     /// that is missing often leaves less than [`predicted_share`](Self::predicted_share).
@@ -235,7 +237,7 @@ impl Rule {
     }
 
     /// What is a probability, a correlation or a share of a whole.
-    fn shares(&self) -> [(&'static str, f64); 17] {
+    fn shares(&self) -> [(&'static str, f64); 21] {
         [
             ("least_gain", self.least_gain),
             ("large_gain", self.large_gain),
@@ -254,6 +256,10 @@ impl Rule {
             ("event_surrogate_level", self.event_surrogate_level),
             ("surrogate_correlation", self.surrogate_correlation),
             ("same_path", self.same_path),
+            ("clear_change", self.clear_change),
+            ("same_start", self.same_start),
+            ("little_share", self.little_share),
+            ("same_model", self.same_model),
         ]
     }
 }
@@ -278,6 +284,10 @@ mod tests {
             (r#"{"least_score": -1}"#, "least_score is -1: give 0 or more"),
             (r#"{"family_wise": 2}"#, "family_wise is 2: it is a share"),
             (r#"{"max_unexplained": 5}"#, "max_unexplained is 5: it is a share"),
+            (r#"{"clear_change": 1.5}"#, "clear_change is 1.5: it is a share"),
+            (r#"{"same_start": 1.5}"#, "same_start is 1.5: it is a share"),
+            (r#"{"little_share": 1.5}"#, "little_share is 1.5: it is a share"),
+            (r#"{"same_model": 1.5}"#, "same_model is 1.5: it is a share"),
             (r#"{"most_steps": 1.5}"#, "most_steps: invalid type"),
             (r#"{"least_score": NaN}"#, "expected value"),
             (r#"{"shortest_block": 9}"#, "shortest_block (9 s) is longer than longest_block (2 s)"),

@@ -39,7 +39,9 @@ class Rule:
     #: No fold may lose more than this share of its squared error.
     worst_fold: float = -0.05
     #: What lowers the squared error of its joints by this share, on the validation set and the other way
-    #: round, needs no folds: a tenth of the rms.
+    #: round, needs no folds: a tenth of the rms. What position servos lack on all logs needs no
+    #: significance where it lowers that of the validation set by this share: few seconds of it are too few
+    #: blocks.
     large_gain: float = 0.19
     #: … where either way adds the same: their correlation.
     least_correlation: float = 0.5
@@ -87,10 +89,10 @@ class Rule:
     #: trial on other data. What is in validation logs only must leave no more of their excess over the
     #: fitted logs.
     max_unexplained: float = 0.35
-    #: Half, and more than it is most. An event of some seconds (a push) must explain most of what its time
-    #: has more of squared error than others; another log has the same push where it has it for most of its
-    #: time; an effect most of which is missing in some octave, by more than ``missing_errors``, is not the
-    #: effect that it is called.
+    #: What is more than this share is most of a thing: half. An event of some seconds (a push) must explain
+    #: most of what its time has more of squared error than others; another log has the same push where it
+    #: has it for most of its time; an effect most of which is missing in some octave, by more than
+    #: ``missing_errors``, is not the effect that it is called.
     most: float = 0.5
     #: See ``most``: standard errors that chance exceeds once in 800, ``family_wise`` over eight octaves.
     missing_errors: float = 3.2
@@ -109,7 +111,8 @@ class Rule:
     #: Two runs start at the same place where every joint does to this share of its travel in all logs.
     same_start: float = 0.05
     #: A validation log whose squared error is this many times that of the fitted logs holds something that
-    #: they do not.
+    #: they do not. For position servos a mass or a gain is looked for in such a log; where none takes away
+    #: most of its squared error, it is unlike the others from that ratio of the rms on.
     odd_log: float = 2.0
     #: A log has the same push if that also explains this share of the force's own torque: a push of another
     #: size or direction is another one.
@@ -119,7 +122,7 @@ class Rule:
     #: … where the variance of its slow means exceeds that of white noise by this factor.
     coloured: float = 2.0
     #: A joint is predicted where no more than this share of its torque's rms is left on the validation set.
-    #: Where no more than this share is not left, a model predicts next to nothing.
+    #: Where more than 1 less this share is left, a model predicts next to nothing.
     predicted_share: float = 0.1
     #: What is left of a joint below this share of its torque needs no name, whatever it depends on: a law
     #: that is missing often leaves less than ``predicted_share``.

@@ -14,6 +14,11 @@ pub fn files(found: &IdentifiedServos) -> Result<Files, String> {
     Ok(Files::default().json("identified.json", found)?.with("report.html", page(found).to_html()))
 }
 
+/// A number where there is one.
+fn cell(of: Option<f64>) -> String {
+    of.map_or("–".to_string(), number)
+}
+
 /// A constant with its standard error and unit.
 #[must_use]
 pub fn in_words(found: &Found) -> String {
@@ -40,12 +45,11 @@ pub fn page(found: &IdentifiedServos) -> Page {
     let mut table = Table::new(["joint", "fit [rad]", "held out [rad]", "goal with a delay, held out [rad]"]);
     for (j, servo) in found.servo.iter().enumerate() {
         let held_out = found.validate.as_ref();
-        let cell = |of: Option<f64>| of.map_or("–".to_string(), number);
         table.push([
             servo.joint.to_string(),
             number(found.fit.position_error[j]),
             cell(held_out.map(|v| v.position_error[j])),
-            cell(held_out.map(|v| v.goal_error[j])),
+            cell(held_out.and_then(|v| v.goal_error[j])),
         ]);
     }
     page.table(&table);
@@ -150,7 +154,7 @@ pub fn explained_page(found: &ExplainedServos) -> Page {
             verdict.joint.to_string(),
             number(found.before.validate.position_error[j]),
             number(found.after.validate.position_error[j]),
-            number(found.goal_error[j]),
+            cell(found.goal_error[j]),
             verdict.state.to_string(),
         ]);
     }

@@ -22,18 +22,20 @@ const FADES: f64 = 15.0;
 
 /// Something that a joint may have.
 pub(super) struct Candidate {
-    name: &'static str,
+    pub name: &'static str,
     /// What is fitted in addition, with the least value and where the search may begin; the scale is the
     /// first start.
-    free: Vec<(Constant, f64, &'static [f64])>,
+    pub free: Vec<(Constant, f64, &'static [f64])>,
     /// What is set and not fitted.
-    set: Vec<(Constant, f64)>,
+    pub set: Vec<(Constant, f64)>,
 }
 
-/// Everything that these logs can show of a joint.
-pub(super) fn all(joint: &Joint<'_>, arm: &ServoArm, rule: &Rule) -> Vec<Candidate> {
+/// Everything that these logs can show of a joint: what follows a signal needs it in the logs to fit and in
+/// those that judge.
+pub(super) fn all(joint: &Joint<'_>, arm: &ServoArm, held_out: &[ServoLog], rule: &Rule) -> Vec<Candidate> {
     let of = |name, free| Candidate { name, free, set: Vec::new() };
     let problem = &joint.problem;
+    let judges = problem.in_logs(&arm.body, held_out, problem.joint);
     let mut all = vec![
         of("load_friction", vec![(Constant::Load, 0.0, &[0.1][..])]),
         of(
@@ -46,7 +48,8 @@ pub(super) fn all(joint: &Joint<'_>, arm: &ServoArm, rule: &Rule) -> Vec<Candida
         ),
     ];
     let tracks = problem.tracks();
-    let volts: Option<Vec<&[f64]>> = tracks.iter().map(|track| track.volts).collect();
+    let has_volts = judges.tracks().iter().all(|track| track.volts.is_some());
+    let volts = tracks.iter().map(|track| track.volts.filter(|_| has_volts)).collect::<Option<Vec<_>>>();
     let known = arm.known(problem.joint).servo.supply;
     if let Some(supply) = volts.and_then(|volts| known.or_else(|| mean(&volts.concat()))) {
         let set = vec![(Constant::Supply, supply)];
@@ -56,11 +59,13 @@ pub(super) fn all(joint: &Joint<'_>, arm: &ServoArm, rule: &Rule) -> Vec<Candida
     let ends = tracks.iter().filter_map(|track| Some(track.t.last()? - track.t.first()?));
     let seconds: f64 = ends.sum();
     match tracks.first().and_then(|track| track.temperature?.first()) {
-        Some(cold) if tracks.iter().all(|track| track.temperature.is_some()) => all.push(Candidate {
-            name: "temperature",
-            free: vec![(Constant::Warmth, -1.0, CHANGES)],
-            set: vec![(Constant::Cold, *cold)],
-        }),
+        Some(cold) if tracks.iter().chain(judges.tracks()).all(|of| of.temperature.is_some()) => {
+            all.push(Candidate {
+                name: "temperature",
+                free: vec![(Constant::Warmth, -1.0, CHANGES)],
+                set: vec![(Constant::Cold, *cold)],
+            })
+        }
         // Whatever drifts in a few seconds looks like warmth.
         _ if seconds < rule.least_time => {}
         _ => all.push(of(
@@ -81,6 +86,13 @@ fn mean(signal: &[f64]) -> Option<f64> {
 }
 
 impl Candidate {
+    /// Whether a constant of it ends at its bound: something else is there, and this only resembles it.
+    fn ends_at_bound(&self, fitted: &Joint<'_>) -> bool {
+        let own = |role: &Role| self.free.iter().any(|(constant, ..)| *role == Role::Constant(*constant));
+        let mut values = fitted.problem.roles.iter().zip(&fitted.fitted.values).zip(&fitted.free);
+        values.any(|((role, value), free)| own(role) && *value <= free.least)
+    }
+
     /// The joint with it, from where it is.
     fn fitted<'l>(&self, joint: &Joint<'l>) -> Joint<'l> {
         let full = joint.problem.constants.of(Constant::Torque);
@@ -185,7 +197,7 @@ fn best<'l>(
     let mut tried = tried.into_iter();
     let (best, k, left, p_value) = tried.next()?;
     let is_sure = left <= 1.0 - rule.large_gain || p_value <= level;
-    if left > 1.0 - rule.least_gain || !is_sure {
+    if left > 1.0 - rule.least_gain || !is_sure || candidates[k].ends_at_bound(&best) {
         return None;
     }
     let samples: usize = judged(joint).tracks().iter().map(|track| track.t.len()).sum();

@@ -19,7 +19,7 @@ use powerball_identification::IdentifyError;
 use powerball_identification::estimate::distribution::{f_tail, t_quantile_975};
 use powerball_identification::servo::constants::Constant;
 use powerball_identification::servo::fit::errors;
-use powerball_identification::servo::{Joint, Problem, Role, ServoArm, rms};
+use powerball_identification::servo::{Joint, Problem, Role, ServoArm, goal_error, off_in_all, rms};
 use powerball_logs::Progress;
 use powerball_logs::log::ServoLog;
 pub use result::{Both, Differs, ExplainedServos, LogResult, ServoEffect, ServoRival, ServoVerdict};
@@ -81,10 +81,13 @@ fn explain_joint(
         // The largest of all joints.
         log.error_ratio = ratio.map(f64::sqrt).into_iter().chain(log.error_ratio).reduce(f64::max);
     }
+    if goal_error(&joint.problem.goal_errors(0.0)).is_none() {
+        result.unusable.push(off_in_all(&JointNumber::from_index(j).to_string()));
+    }
     let base = joint.problem.in_logs(&arm.body, logs, j);
     let base_validate = joint.problem.in_logs(&arm.body, validate, j);
     result.before.add(&errors(&base, &[]), &errors(&base_validate, &[]));
-    let all = candidates::all(&joint, arm, rule);
+    let all = candidates::all(&joint, arm, held_out, rule);
     candidates::name(&mut joint, &mut result.effects, all, (arm, held_out), rule);
     report_odd(result, arm, &joint, (logs, validate), &found, j);
     Ok(())
@@ -162,21 +165,28 @@ fn report_odd(
     let is_odd: Vec<bool> = odd.changes.iter().map(Option::is_some).collect();
     for (change, own) in &odd.groups {
         let change = *change;
+        // They are unlike the others, with a name or without.
+        own.iter().for_each(|k| result.logs[*k].like_the_others = false);
         let Some((size, squares)) = odd.size(change, own, logs.len()) else { continue };
         let spread = by_log::spread(&odd.sizes, &is_odd, change) / (own.len() as f64).sqrt();
         let between = between(&odd.sizes, own, change);
         let std = size.std.hypot(spread).hypot(between);
-        let before = rms_of(&left, own);
-        let mut with = squares.into_iter();
-        own.iter().for_each(|k| left[*k] = with.by_ref().take(left[*k].len()).collect());
         let blocks: usize = own.iter().map(|k| odd.each[*k].blocks()).sum();
         let usual = is_odd.iter().filter(|odd| !**odd).count();
         let freedom = freedom([(size.std, blocks), (spread, usual), (between, own.len())]);
         let p_value = f_tail(((size.value - change.none()) / std).powi(2), 1.0, freedom);
+        let half = t_quantile_975(freedom) * std;
+        // What may be nothing has no name.
+        if (size.value - change.none()).abs() <= half {
+            continue;
+        }
+        let before = rms_of(&left, own);
+        let mut with = squares.into_iter();
+        own.iter().for_each(|k| left[*k] = with.by_ref().take(left[*k].len()).collect());
         let effect = ServoEffect {
             effect: change.name(),
             joints: vec![number],
-            parameters: parameters(arm, joint, change, (size.value, std, freedom), own.len()),
+            parameters: parameters(arm, joint, change, (size.value, std, half), own.len()),
             rms_before: vec![before],
             rms_after: vec![rms_of(&left, own)],
             p_value,
@@ -203,7 +213,7 @@ fn report_odd(
     let delay = joint.goal_delay();
     let goal: Vec<Vec<f64>> =
         each.iter().skip(logs.len()).flat_map(|problem| problem.goal_errors(delay)).collect();
-    result.goal_error.push(rms(&goal));
+    result.goal_error.push(goal_error(&goal));
 }
 
 /// The degrees of freedom of a standard error that is made of several, each with its count of numbers (Welch
@@ -233,11 +243,10 @@ fn parameters(
     arm: &ServoArm,
     joint: &Joint<'_>,
     change: Change,
-    (value, std, freedom): (f64, f64, f64),
+    (value, std, half): (f64, f64, f64),
     logs: usize,
 ) -> serde_json::Map<String, serde_json::Value> {
     let absolute = arm.known(joint.problem.joint).is_absolute();
-    let half = t_quantile_975(freedom) * std;
     let interval = [value - half, value + half];
     let of = match change {
         Change::Payload if absolute => json!({"mass": value, "mass_std": std, "mass_interval": interval,
@@ -254,20 +263,18 @@ fn parameters(
 }
 
 fn rivals(sizes: &[[Option<Size>; 2]], own: &[usize], change: Change) -> Vec<ServoRival> {
-    let left = |change: Change| -> f64 {
-        let of = own.iter().filter_map(|k| sizes[*k][change as usize]);
-        let (after, before) = of.fold((0.0, 0.0), |(a, b), size| (a + size.after, b + size.before));
-        after / f64::max(before, f64::MIN_POSITIVE)
+    let left = |change: Change| -> Option<f64> {
+        let all: Option<Vec<Size>> = own.iter().map(|k| sizes[*k][change as usize]).collect();
+        let sum = |(a, b): (f64, f64), size: &Size| (a + size.after, b + size.before);
+        let (after, before) = all?.iter().fold((0.0, 0.0), sum);
+        Some(100.0 * after / before.max(f64::MIN_POSITIVE))
+    };
+    let why_not = |other: Change| match (left(other), left(change)) {
+        (Some(theirs), Some(ours)) => {
+            format!("leaves {theirs:.0} % of the squared error of these logs, not {ours:.0} %")
+        }
+        _ => "these logs cannot show it".into(),
     };
     let others = Change::ALL.into_iter().filter(|other| *other != change);
-    others
-        .map(|other| ServoRival {
-            effect: other.name().to_string(),
-            why_not: format!(
-                "leaves {:.0} % of the squared error of these logs, not {:.0} %",
-                100.0 * left(other),
-                100.0 * left(change)
-            ),
-        })
-        .collect()
+    others.map(|other| ServoRival { effect: other.name().to_string(), why_not: why_not(other) }).collect()
 }

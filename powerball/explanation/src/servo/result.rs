@@ -18,8 +18,9 @@ pub struct ExplainedServos {
     pub before: Both,
     /// With what was named.
     pub after: Both,
-    /// Position error of the logged goal with its best delay on the validation logs, rms by joint, rad.
-    pub goal_error: Vec<f64>,
+    /// Position error of the logged goal with its best delay on the validation logs, rms by joint, rad;
+    /// `None` where the drive was always switched off.
+    pub goal_error: Vec<Option<f64>>,
     /// What was named, in the order in which it was.
     pub effects: Vec<ServoEffect>,
     /// Each log, those to fit first.
@@ -94,7 +95,8 @@ pub struct ServoRival {
 pub struct LogResult {
     /// The file.
     pub log: String,
-    /// Whether it is as the others are.
+    /// Whether it is as the others are: it has nothing alone, named or not, and its `error_ratio` is at most
+    /// [`Rule::odd_log`].
     pub like_the_others: bool,
     /// The log's position error before anything was named, over the median one of the fitted logs; of the
     /// joint where it is largest.
@@ -123,10 +125,11 @@ pub struct Differs {
 pub struct ServoVerdict {
     /// The joint.
     pub joint: JointNumber,
-    /// "predicted", "improved" or "not predicted".
+    /// "predicted", "improved", "not predicted", or "not judged" where no validation log has the drive
+    /// switched on.
     pub state: &'static str,
-    /// The position error over that of the goal with its best delay.
-    pub left: f64,
+    /// The position error over that of the goal with its best delay; `None` where it is not judged.
+    pub left: Option<f64>,
     /// What to do; empty where little is left.
     pub advice: String,
 }
@@ -157,20 +160,22 @@ impl ExplainedServos {
     pub(super) fn conclude(&mut self, rule: &Rule) {
         for log in &mut self.logs {
             let is_usual = log.error_ratio.is_none_or(|ratio| ratio <= rule.odd_log);
-            log.like_the_others = log.differs.is_empty() && is_usual;
+            log.like_the_others &= log.differs.is_empty() && is_usual;
         }
         for j in 0..self.goal_error.len() {
             let joint = JointNumber::from_index(j);
             let (before, after) =
                 (self.before.validate.position_error[j], self.after.validate.position_error[j]);
-            let left = after / self.goal_error[j].max(f64::MIN_POSITIVE);
-            let state = match () {
-                () if left <= rule.predicted_share => "predicted",
-                () if after < before && left < 1.0 => "improved",
-                () => "not predicted",
+            let left = self.goal_error[j].map(|goal_error| after / goal_error.max(f64::MIN_POSITIVE));
+            let state = match left {
+                None => "not judged",
+                Some(left) if left <= rule.predicted_share => "predicted",
+                Some(left) if after < before && left < 1.0 => "improved",
+                Some(_) => "not predicted",
             };
             let advice = match state {
                 "predicted" => String::new(),
+                "not judged" => "give validation logs with the drive switched on".into(),
                 _ => {
                     "record steps, a fast path and one where the drive is switched off, with two loads that \
                     are known"
@@ -178,7 +183,7 @@ impl ExplainedServos {
                 }
             };
             self.verdict.push(ServoVerdict { joint, state, left, advice });
-            if left >= 1.0 {
+            if left.is_some_and(|left| left >= 1.0) {
                 self.unusable.push(format!(
                     "the position of joint {joint} is predicted no better than by its goal with a delay"
                 ));

@@ -1,7 +1,7 @@
 //! Logs of a servo with one thing that the base lacks, by another formulation than the simulation that is
 //! fitted: explicit steps of 20 µs, and a joint that rests while friction can hold it.
 
-use super::tests::servos::{pendulum, point};
+use super::tests::servos::{karnopp, pendulum, point};
 use super::*;
 
 /// A servo; what is 0 is not there.
@@ -59,12 +59,7 @@ impl Plant {
             let weight = MASS * 9.81 * LENGTH * q.sin();
             let dry = ease * 0.12 + self.load * 0.5 * (motor + weight).abs();
             let drive = motor - weight - ease * 0.2 * v;
-            if v.abs() < 1e-4 && drive.abs() <= dry {
-                v = 0.0;
-            } else {
-                let way = if v.abs() < 1e-4 { drive.signum() } else { v.signum() };
-                v += h * (drive - way * dry) / (rotor + MASS * LENGTH * LENGTH);
-            }
+            v = karnopp(v, (drive, dry, rotor + MASS * LENGTH * LENGTH), h);
             q += h * v;
         }
         log
@@ -100,12 +95,21 @@ impl Plant {
 
     /// What is named of it.
     fn named(&self, seconds: f64, warm: bool) -> Vec<ServoEffect> {
-        let arm = pendulum(LENGTH, &format!("kp = 16\nsupply = {SUPPLY}"));
-        let servos = ServoArm::new(&arm, Some(&point(MASS))).unwrap();
-        let (logs, validate) = self.logs(seconds, &arm, warm);
-        let found = explain_servos(&servos, &logs, &validate, &Rule::default(), Progress::default()).unwrap();
-        found.effects
+        self.explained(seconds, warm, |_| ()).effects
     }
+
+    /// With other validation logs.
+    fn explained(&self, seconds: f64, warm: bool, other: impl Fn(&mut ServoLog)) -> ExplainedServos {
+        let servos = servos();
+        let (logs, mut validate) = self.logs(seconds, servos.body.arm(), warm);
+        validate.iter_mut().for_each(other);
+        explain_servos(&servos, &logs, &validate, &Rule::default(), Progress::default()).unwrap()
+    }
+}
+
+fn servos() -> ServoArm {
+    let arm = pendulum(LENGTH, &format!("kp = 16\nsupply = {SUPPLY}"));
+    ServoArm::new(&arm, Some(&point(MASS))).unwrap()
 }
 
 fn number(effect: &ServoEffect, key: &str) -> f64 {
@@ -140,4 +144,57 @@ fn friction_that_falls_with_the_temperature_or_with_running_time_is_named() {
     let found = Plant { warmth: -0.6, warm_in: 20.0, ..Plant::default() }.named(16.0, false);
     assert!(matches!(found.as_slice(), [one] if one.effect == "temperature"), "{found:?}");
     assert!((number(&found[0], "change") + 0.6).abs() < 0.2, "{found:?}");
+}
+
+/// What follows a voltage is judged by logs with that voltage; without it nothing else is named in its place.
+#[test]
+fn what_follows_a_signal_needs_it_in_the_validation_logs() {
+    let sags = Plant { sag: 0.35, ..Plant::default() };
+    let found = sags.explained(4.0, true, |log| log.volts = None).effects;
+    assert!(found.is_empty(), "{found:?}");
+    let warm = Plant { warmth: -0.5, ..Plant::default() };
+    let found = warm.explained(8.0, true, |log| log.temperature = None).effects;
+    assert!(found.is_empty(), "{found:?}");
+}
+
+/// Friction by load of at least 0.5, where it is 0.3: better than none, and no size.
+#[test]
+fn what_ends_at_its_bound_is_not_named() {
+    let servos = servos();
+    let (logs, validate) = Plant { load: 0.3, ..Plant::default() }.logs(4.0, servos.body.arm(), true);
+    let mut problem = Problem::new(&servos.body, &logs, 0, &servos.known(0)).unwrap();
+    problem.roles.retain(|role| *role != Role::Constant(Constant::Load));
+    let mut joint = Joint::solve(problem);
+    for (least, names) in [(0.5, &[][..]), (0.0, &["load_friction"][..])] {
+        let free = vec![(Constant::Load, least, &[0.6][..])];
+        let one = candidates::Candidate { name: "load_friction", free, set: Vec::new() };
+        let mut effects = Vec::new();
+        candidates::name(&mut joint, &mut effects, vec![one], (&servos, &validate), &Rule::default());
+        let found: Vec<&str> = effects.iter().map(|effect| effect.effect).collect();
+        assert_eq!(found, names, "{effects:?}");
+    }
+}
+
+/// A drive that is switched off has no goal to be compared with.
+#[test]
+fn a_drive_that_is_switched_off_is_not_judged() {
+    let off = |log: &mut ServoLog| log.enabled = Some(vec![vec![false; log.t.len()]]);
+    let found = Plant::default().explained(4.0, true, off);
+    let [verdict] = &found.verdict[..] else { panic!("{:?}", found.verdict) };
+    assert_eq!((verdict.state, verdict.left, found.goal_error.as_slice()), ("not judged", None, &[None][..]));
+    assert!(found.unusable.is_empty(), "{:?}", found.unusable);
+}
+
+#[test]
+fn a_rival_that_a_log_cannot_show_leaves_nothing_to_compare() {
+    let size = |after| Some(Size { value: 1.0, std: 0.1, blocks: 6, before: 1.0, after });
+    let why = |sizes: &[[Option<Size>; 2]], own: &[usize]| {
+        let [rival] = &rivals(sizes, own, Change::Payload)[..] else { panic!("one other change") };
+        (rival.effect.clone(), rival.why_not.clone())
+    };
+    let sizes = [[size(0.25), size(0.75)], [size(0.25), None]];
+    let (effect, first) = why(&sizes, &[0]);
+    assert_eq!(effect, "torque_constant");
+    assert_eq!(first, "leaves 75 % of the squared error of these logs, not 25 %");
+    assert_eq!(why(&sizes, &[0, 1]).1, "these logs cannot show it");
 }

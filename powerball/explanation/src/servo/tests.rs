@@ -90,6 +90,9 @@ fn how_often_gains_are_right() {
         "logs that are unlike the others where nothing differs: {unlike} of {}",
         2 * PATHS.len() * all().len()
     );
+    // docs/servos.md has the figures; another compiler's rounding may change a few of them.
+    assert_eq!((count, same), (120, all().len()));
+    assert!(named >= 109 && right >= 103, "{named} {right}");
 }
 
 /// What is reported of three logs of the other mass among logs of one mass.
@@ -134,17 +137,34 @@ fn another_mass_in_three_logs_is_found() {
     assert!((mass / found.truth - 1.0).abs() < 0.1 && holds, "{mass} ± {std} kg");
 }
 
+/// At the highest gain a drive hardly moves under another load: its mass may be anything, and is not named.
+#[test]
+fn a_mass_that_may_be_none_is_not_named() {
+    let Some(measured) = Measured::unpack() else { return };
+    let own = (0, 0.15, 32);
+    let mut validate = measured.logs((MASSES[0].0, own.1, own.2), 2);
+    validate.extend(
+        ["sin_time_square", "up_and_down", "brutal"]
+            .map(|path| measured.log((MASSES[1].0, own.1, own.2), path, 2)),
+    );
+    let found = explained(&measured, own, &validate);
+    assert!(found.effects.iter().all(|effect| effect.effect != "payload"), "{:?}", found.effects);
+    let unlike = |log: &&LogResult| !log.like_the_others && log.log.contains("m1.168");
+    assert_eq!(found.logs.iter().filter(unlike).count(), 3, "{:?}", found.logs);
+}
+
 #[test]
 #[ignore = "at_length: 60 explanations"]
 fn how_often_masses_are_right() {
     let Some(measured) = Measured::unpack() else { return };
-    let (mut near, mut held, mut wrong, mut count) = (0, 0, 0, 0);
+    let (mut near, mut held, mut named, mut wrong, mut count) = (0, 0, 0, 0, 0);
     for own in all() {
         for first in 0..PATHS.len() {
             let Three { truth, mass, said, wrong: others } = three_of_another_mass(&measured, own, first);
             (count, wrong) = (count + 1, wrong + others);
             println!("{own:?} {first}: {mass:.3?} kg for {truth:.3}, {said:?}");
             if let Some((value, _, holds)) = mass {
+                named += 1;
                 near += usize::from((value / truth - 1.0).abs() < 0.1);
                 held += usize::from(holds);
             }
@@ -152,6 +172,9 @@ fn how_often_masses_are_right() {
     }
     println!("mass from three logs within 10 %: {near} of {count}; its interval holds it: {held}");
     println!("logs of the known mass that are named: {wrong} of {}", count * 2 * PATHS.len());
+    println!("named with a mass: {named} of {count}");
+    assert_eq!((count, wrong), (60, 0));
+    assert!(near >= 20 && held >= 36 && named <= held + 11, "{near} {held} {named}");
 }
 
 /// What is named on all logs of one mass, length and gain, and the position error on logs of the other mass,
@@ -163,7 +186,7 @@ fn on_the_other_mass(measured: &Measured, own: (usize, f64, u32), most: usize) -
     let mut problem = Problem::new(&servos.body, &logs, 0, &servos.known(0)).unwrap();
     problem.roles.retain(|role| *role != Role::Constant(Constant::Load));
     let mut joint = Joint::solve(problem);
-    let (mut effects, mut all) = (Vec::new(), candidates::all(&joint, &servos, &Rule::default()));
+    let (mut effects, mut all) = (Vec::new(), candidates::all(&joint, &servos, &validate, &Rule::default()));
     all.truncate(most);
     candidates::name(&mut joint, &mut effects, all, (&servos, &validate), &Rule::default());
     let others = measured.logs((other.0, own.1, own.2), 1);
@@ -177,15 +200,20 @@ fn on_the_other_mass(measured: &Measured, own: (usize, f64, u32), most: usize) -
 #[ignore = "at_length: 24 explanations"]
 fn what_is_named_on_all_logs_holds_on_another_mass() {
     let Some(measured) = Measured::unpack() else { return };
-    let mut sums = [0.0; 2];
+    let (mut sums, mut names) = ([0.0; 2], Vec::new());
     for own in all() {
         let tried = [2, 9].map(|most| on_the_other_mass(&measured, own, most));
         sums.iter_mut().zip(&tried).for_each(|(sum, (_, error))| *sum += error);
         println!("{own:?}: {tried:.4?}");
+        names.extend(tried[1].0.iter().copied());
     }
     println!(
         "mean on the other mass: {:.4} rad with load_friction and stribeck, {:.4} with all",
         sums[0] / 12.0,
         sums[1] / 12.0
     );
+    let count = |name: &str| names.iter().filter(|own| **own == name).count();
+    assert!(count("load_friction") <= 5 && count("stribeck") <= 3, "{names:?}");
+    assert!(count("torque_constant") == 0 && count("temperature") <= 2, "{names:?}");
+    assert!(sums[1] <= 1.06 * sums[0] && sums[0] / 12.0 < 0.09, "{sums:?}");
 }

@@ -2,6 +2,7 @@
 
 use super::{NamedTerm, TorqueModel};
 use powerball_controller::correction::{Law, Term};
+use powerball_identification::servo::no_torques;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::Path;
@@ -208,6 +209,9 @@ impl TorqueModel {
     pub fn parse(text: &str, path: &Path) -> Result<TorqueModel, FileError> {
         let wrong = |what: String| FileError(format!("{}: {what}", path.display()));
         let json: Value = serde_json::from_str(text).map_err(|e| wrong(format!("is no JSON: {e}")))?;
+        if let Some(why) = no_torques(&json) {
+            return Err(wrong(why));
+        }
         for key in ["parameters", "friction"] {
             if !json[key].is_array() {
                 return Err(wrong(format!("has no list '{key}': it is not a model.json or identified.json")));

@@ -155,6 +155,17 @@ fn a_model_of_another_arm_is_refused_with_the_reason() {
     assert!(changes.of(body.arm()).unwrap_err().to_string().contains("'mx9'"));
 }
 
+/// What `powerball identify` writes for logs without torque.
+#[test]
+fn servos_are_no_torque_model() {
+    let text = r#"{"set": "servo", "parameters": [], "friction": [{"joint": 1, "coulomb": 0.1}]}"#;
+    let why = TorqueModel::parse(text, std::path::Path::new("identified.json")).unwrap_err().to_string();
+    assert!(
+        why.starts_with("identified.json: is of position servos and has no torque model; dyngen"),
+        "{why}"
+    );
+}
+
 /// One arm: its logs shifted by an offset, its terms written for true positions.
 #[test]
 fn putting_a_zero_right_does_not_change_the_torque() {

@@ -6,6 +6,7 @@ use crate::Identified;
 use crate::estimate::{
     JointFriction, ParameterEstimate, Uncertainty, distribution::freedom_of, friction_row,
 };
+use crate::servo::no_torques;
 use powerball_controller::friction::TanhFriction;
 use powerball_logs::log::Log;
 use serde::Deserialize;
@@ -82,6 +83,9 @@ impl Side {
             |file: &Path, what: String| CompareError::Unreadable(format!("{}: {what}", file.display()));
         let file = if path.is_dir() { path.join("identified.json") } else { path.to_path_buf() };
         let text = dyngen::file::text(&file).map_err(|e| wrong(&file, format!("cannot be read: {e}")))?;
+        if let Some(why) = serde_json::from_str(&text).ok().and_then(|json| no_torques(&json)) {
+            return Err(wrong(&file, why));
+        }
         let model: File = serde_json::from_str(&text)
             .map_err(|e| wrong(&file, format!("is not a result of `powerball identify`: {e}")))?;
         let covariance = file.with_file_name("covariance.json");

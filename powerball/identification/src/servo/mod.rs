@@ -27,7 +27,7 @@ use powerball_logs::Progress;
 use powerball_logs::log::ServoLog;
 use powerball_logs::regression::RigidArm;
 pub use problem::{Known, Problem, Role};
-pub use result::{Along, IdentifiedServos, JointServo, PositionStats, ServoFriction};
+pub use result::{Along, IdentifiedServos, JointServo, PositionStats, ServoFriction, no_torques};
 pub use uncertainty::standard_errors;
 
 /// Delays of the goal that are tried for its error, s.
@@ -170,7 +170,7 @@ pub fn identify_servos(
     let mut result = IdentifiedServos {
         unusable: crate::usable::servo_doubts(arm.body.arm(), logs.iter().chain(validate)),
         arm: arm.body.arm().name.clone(),
-        set: "servo",
+        set: result::SET,
         parameters: Vec::new(),
         friction: Vec::new(),
         servo: Vec::new(),
@@ -200,10 +200,15 @@ pub fn identify_servos(
         result.along.push(along(shown, left));
     }
     let judged = result.validate.as_ref().unwrap_or(&result.fit);
-    let useless: Vec<String> = (0..dof)
-        .filter(|j| judged.position_error[*j] >= judged.goal_error[*j])
-        .map(|j| (j + 1).to_string())
-        .collect();
+    let numbers = |which: &dyn Fn(usize) -> bool| -> Vec<String> {
+        (0..dof).filter(|j| which(*j)).map(|j| (j + 1).to_string()).collect()
+    };
+    let off = numbers(&|j| result.fit.goal_error[j].is_none());
+    let useless =
+        numbers(&|j| judged.goal_error[j].is_some_and(|goal_error| judged.position_error[j] >= goal_error));
+    if !off.is_empty() {
+        result.unusable.push(off_in_all(&off.join(", ")));
+    }
     if !useless.is_empty() {
         result.unusable.push(format!(
             "the position of joint {} is predicted no better than by its goal with a delay",
@@ -213,9 +218,25 @@ pub fn identify_servos(
     Ok(result)
 }
 
+/// Why a drive that is never switched on cannot be identified.
+#[must_use]
+pub fn off_in_all(joints: &str) -> String {
+    format!(
+        "the drive of joint {joints} is switched off (torque_enable) in all logs to fit: record some with it \
+         switched on"
+    )
+}
+
+/// The root of the mean square of the errors of a goal, rad; `None` where the drive was always switched off,
+/// which has no goal.
+#[must_use]
+pub fn goal_error(errors: &[Vec<f64>]) -> Option<f64> {
+    errors.iter().any(|own| !own.is_empty()).then(|| rms(errors))
+}
+
 fn add(stats: &mut PositionStats, left: &[Vec<f64>], goal: &[Vec<f64>]) {
     stats.position_error.push(rms(left));
-    stats.goal_error.push(rms(goal));
+    stats.goal_error.push(goal_error(goal));
     stats.samples = stats.samples.max(left.iter().map(Vec::len).sum());
 }
 
@@ -236,7 +257,12 @@ fn report(result: &mut IdentifiedServos, arm: &ServoArm, joint: &Joint<'_>, j: u
             continue;
         }
         let std = fitted.and_then(|at| joint.std[at]);
-        hidden.extend((fitted.is_some() && std.is_none()).then_some(name));
+        // A torque that no log reaches has a standard error as large as it is.
+        let is_hidden = match constant {
+            Constant::Torque => !Values::is_shown(value, std),
+            _ => std.is_none(),
+        };
+        hidden.extend((fitted.is_some() && is_hidden).then_some(name));
         let unit = constant.unit(absolute).to_string();
         parameters.push(Found { name: name.to_string(), value, std, unit, known: fitted.is_none() });
     }

@@ -4,6 +4,16 @@ use super::constants::Found;
 use powerball_controller::JointNumber;
 use serde::Serialize;
 
+/// What was fitted, in the file.
+pub(super) const SET: &str = "servo";
+
+/// Why the JSON of a result is no torque model, where it is that of position servos.
+#[must_use]
+pub fn no_torques(json: &serde_json::Value) -> Option<String> {
+    let why = "is of position servos and has no torque model; dyngen export --to mjcf takes it";
+    (json["set"] == SET).then(|| why.to_string())
+}
+
 /// Servos with their errors; as JSON it is `identified.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct IdentifiedServos {
@@ -59,8 +69,9 @@ pub struct ServoFriction {
 pub struct PositionStats {
     /// rms by joint, rad.
     pub position_error: Vec<f64>,
-    /// That of the logged goal with its best delay, rms by joint, rad.
-    pub goal_error: Vec<f64>,
+    /// That of the logged goal with its best delay, rms by joint, rad; `None` where the drive was always
+    /// switched off.
+    pub goal_error: Vec<Option<f64>>,
     /// Samples.
     pub samples: usize,
 }

@@ -6,7 +6,7 @@ use super::simulate::{Track, simulate};
 use super::*;
 use powerball_logs::log::ServoLog;
 use powerball_logs::signal::resample::linear_at;
-use servos::{GAINS, LENGTHS, MASSES, Measured, pendulum, point};
+use servos::{GAINS, LENGTHS, MASSES, Measured, karnopp, pendulum, point};
 
 #[path = "../../../../tests/support/servos.rs"]
 mod servos;
@@ -29,9 +29,8 @@ fn truth() -> Constants {
     set.into_iter().fold(Constants::ideal(), |own, (constant, value)| own.with(constant, value))
 }
 
-/// The servo by explicit steps of 20 µs and Karnopp's stick: a joint rests while the torque on it is below
-/// friction.
-fn karnopp(
+/// The servo by explicit steps of 20 µs.
+fn explicit(
     t: &[f64],
     goal: impl Fn(f64) -> f64,
     off_from: f64,
@@ -53,12 +52,7 @@ fn karnopp(
             let body = mass * 9.81 * length * (q + of(Constant::Zero)).sin();
             let dry = of(Constant::Coulomb) + of(Constant::Load) * 0.5 * (motor + body).abs();
             let drive = motor - body - of(Constant::Viscous) * v;
-            if v.abs() < 1e-4 && drive.abs() <= dry {
-                v = 0.0;
-            } else {
-                let way = if v.abs() < 1e-4 { drive.signum() } else { v.signum() };
-                v += h * (drive - way * dry) / inertia;
-            }
+            v = karnopp(v, (drive, dry, inertia), h);
             q += h * v;
             time += h;
         }
@@ -76,7 +70,7 @@ fn synthetic(arm: &Arm) -> Vec<ServoLog> {
     let of = |name: &str, goal: &dyn Fn(f64) -> f64, off_from: f64| {
         let logged: Vec<f64> = t.iter().map(|t| goal(*t)).collect();
         let between = |time: f64| linear_at(&t, &logged, time);
-        let q = karnopp(&t, between, off_from, &truth(), (0.8, 0.12));
+        let q = explicit(&t, between, off_from, &truth(), (0.8, 0.12));
         let on: Vec<f64> = t.iter().map(|t| f64::from(*t < off_from)).collect();
         let columns = [("t", &t), ("q1", &q), ("goal1", &logged), ("torque_enable1", &on)];
         let columns: Vec<(String, &[f64])> =
@@ -124,6 +118,43 @@ fn a_servo_of_another_formulation_is_recovered() {
         // Steps of 2.5 ms against 20 µs: a percent, whatever the interval.
         let own = if constant == Constant::Zero { 0.002 } else { 0.02 * true_value };
         assert!(off < (4.0 * std).max(own), "{}: {} ± {std}, {true_value}", p.name, p.value);
+    }
+}
+
+/// A drive that is switched off has no goal to be compared with, and shows nothing of itself.
+#[test]
+fn a_drive_that_is_switched_off_is_not_judged_by_its_goal() {
+    let arm = pendulum(0.12, "kp = 16");
+    let servos = ServoArm::new(&arm, Some(&point(0.8))).unwrap();
+    let mut logs = synthetic(&arm);
+    let mut off = logs.pop().unwrap();
+    off.enabled = Some(vec![vec![false; off.t.len()]]);
+    let of = |fit: &[ServoLog], validate: &[ServoLog]| {
+        identify_servos(&servos, fit, validate, Progress::default()).unwrap()
+    };
+    let found = of(&logs, std::slice::from_ref(&off));
+    assert!(found.unusable.is_empty(), "{:?}", found.unusable);
+    assert_eq!(found.validate.as_ref().unwrap().goal_error, [None]);
+    assert!(serde_json::to_value(&found).unwrap()["validate"]["goal_error"][0].is_null());
+    let found = of(std::slice::from_ref(&off), &logs);
+    assert!(found.unusable[0].contains("joint 1 is switched off (torque_enable) in all"), "{found:?}");
+}
+
+/// Where no log reaches full duty, the standard error of the torque is as large as the torque.
+#[test]
+fn a_torque_that_no_log_reaches_is_not_shown() {
+    let arm = pendulum(0.12, "kp = 16");
+    let (servos, logs) = (ServoArm::new(&arm, Some(&point(0.8))).unwrap(), synthetic(&arm));
+    let mut found = identify_servos(&servos, &logs, &[], Progress::default()).unwrap();
+    let mut joint = Joint::fit(&servos, &logs, 0).unwrap();
+    let torque = |role: &Role| *role == Role::Constant(Constant::Torque);
+    let at = joint.problem.roles.iter().position(torque).unwrap();
+    for (std, hidden) in [(Some(0.25), false), (Some(0.35), true), (Some(40.0), true), (None, true)] {
+        joint.std[at] = std.map(|share| share * joint.fitted.values[at]);
+        found.warnings.clear();
+        report(&mut found, &servos, &joint, 0);
+        let warned = found.warnings.iter().any(|warning| warning.contains("do not show torque alone"));
+        assert_eq!(warned, hidden, "{std:?}: {:?}", found.warnings);
     }
 }
 

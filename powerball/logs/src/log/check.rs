@@ -43,7 +43,7 @@ pub(super) fn into_log(
             of_motors(arm, take(&mut raw.effort).into_iter().zip(constants).map(scaled).collect())
         }
     };
-    let temperature = raw.temperature.take().filter(|t| t.iter().flatten().all(|v| v.is_finite()));
+    let temperature = raw.temperature.take().filter(|of| are_whole(of, file, findings));
     Ok(Log {
         file: file.to_string(),
         t: take(&mut raw.t),
@@ -55,6 +55,22 @@ pub(super) fn into_log(
         doubts,
         clock: 0.0,
     })
+}
+
+/// Whether temperatures are there in every sample; each joint that lacks some is reported.
+fn are_whole(temperature: &[Vec<f64>], file: &str, findings: &mut Vec<Finding>) -> bool {
+    let before = findings.len();
+    for (j, signal) in temperature.iter().enumerate() {
+        let missing = signal.iter().filter(|v| !v.is_finite()).count();
+        if missing > 0 {
+            let message = format!(
+                "{missing} of {} samples are no number: the log's temperatures are not used; fill these samples",
+                signal.len()
+            );
+            findings.push(finding(file, None, format!("temp{}", j + 1), message));
+        }
+    }
+    findings.len() == before
 }
 
 fn finding(file: &str, line: Option<usize>, quantity: impl Into<String>, message: String) -> Finding {

@@ -105,6 +105,25 @@ fn rtde_recordings_are_read_by_their_names() {
     }
 }
 
+/// Temperatures are those of every sample or none, and what is missing is reported.
+#[test]
+fn temperatures_that_lack_samples_are_reported() {
+    let header = format!("{HEADER},temp1,temp2");
+    for (holes, reported) in [(0, false), (1, true), (2, true)] {
+        let (log, findings) = read(&text(&header, |k, mut f| {
+            let hole = k < holes;
+            f.extend(["30".to_string(), if hole { String::new() } else { "31".to_string() }]);
+            Some(f.join(","))
+        }));
+        let log = log.unwrap();
+        assert_eq!((log.temperature.is_none(), log.t.len()), (reported, 200));
+        let found: Vec<String> = findings.iter().map(ToString::to_string).collect();
+        let expected = format!("temp2: {holes} of 200 samples are no number: the log's temperatures are not");
+        assert_eq!(found.iter().filter(|one| one.contains(&expected)).count(), found.len(), "{found:?}");
+        assert_eq!(found.len(), usize::from(reported), "{found:?}");
+    }
+}
+
 #[test]
 fn faults_are_found_with_their_line_and_taken_out() {
     let spoilt = text(&format!("{HEADER},mode"), |k, mut f| {

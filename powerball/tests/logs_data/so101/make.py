@@ -1,8 +1,10 @@
 """Makes the datasets of this folder: LeRobot's version 3, of two joints of an SO-101 on position servos.
 
-    pip install mujoco numpy pyarrow && python make.py so101.urdf
+    pip install mujoco numpy pyarrow && python make.py so101.urdf [--hold]
 
-MuJoCo simulates them, and shares nothing with powerball. The URDF is that of TheRobotStudio (SO-ARM100, Apache 2.0); arm.toml
+MuJoCo simulates them, with one thing as powerball has it: between two frames the goal goes in a straight
+line. With --hold the drive holds each goal until the next one comes, and acts half a frame later:
+docs/servos.md has what is then found. The URDF is that of TheRobotStudio (SO-ARM100, Apache 2.0); arm.toml
 and arm.values.json are `dyngen import so101.urdf --lock shoulder_pan=0 --lock wrist_flex=0 --lock wrist_roll=0 --lock gripper=0`.
 """
 
@@ -21,6 +23,7 @@ JOINTS = ["shoulder_lift", "elbow_flex"]
 FIXED = ["shoulder_pan", "wrist_flex", "wrist_roll", "gripper"]
 KP, FORCE, DAMPING, ARMATURE, FRICTION, DELAY = 17.8, 3.0, 0.6, 0.028, 0.052, 0.03
 RATE, SECONDS, STEP = 30, 4, 2e-4
+HOLD = "--hold" in sys.argv
 MIDDLE, HALF = np.array([-1.5, 1.3]), np.array([1.2, 1.2])
 
 
@@ -64,7 +67,7 @@ def episode(m, rng):
         first, last = (round(n / RATE / STEP) for n in (k, k + 1))
         for s in range(last - first):
             seen = max((k / RATE + s * STEP - DELAY) * RATE, 0)
-            at, share = math.floor(seen), seen % 1
+            at, share = math.floor(seen), 0 if HOLD else seen % 1
             data.ctrl[:] = frames[at] * (1 - share) + frames[min(at + 1, len(frames) - 1)] * share
             mujoco.mj_step(m, data)
     return frames, np.array(states)

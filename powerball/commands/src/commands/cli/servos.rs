@@ -159,10 +159,10 @@ fn in_words(found: &IdentifiedServos) -> Vec<String> {
     let mut lines = vec!["joint  position error (simulated closed loop), rad".to_string()];
     for (j, servo) in found.servo.iter().enumerate() {
         let held_out = found.validate.as_ref().map_or(String::new(), |v| {
-            format!(
-                ", held out {:.4} (its goal, late by the best delay: {:.4})",
-                v.position_error[j], v.goal_error[j]
-            )
+            let goal = v.goal_error[j].map_or("the drive is off".to_string(), |error| {
+                format!("its goal, late by the best delay: {error:.4}")
+            });
+            format!(", held out {:.4} ({goal})", v.position_error[j])
         });
         lines.push(format!(
             "{:>5}  fit {:.4}{held_out}",
