@@ -44,8 +44,8 @@ struct Axis {
 /// The ranges for `values` of the full set.
 ///
 /// # Errors
-/// Where a link is no body with mass and volume, or the energy is more than that of the links: rotors, bars of
-/// loops, joints that follow others.
+/// Where a link is no body with mass and volume, or the energy is more than that of the links: rotors, bars
+/// of loops, joints that follow others.
 pub(super) fn factors(
     arm: &Arm,
     set: &ParameterSet,

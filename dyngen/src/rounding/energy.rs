@@ -171,7 +171,7 @@ impl Solves {
         }
         let last = self.pivots.len() - 1;
         for (s, _) in self.given[k].iter().filter(|(_, i)| *i == last) {
-            // y is the right-hand side here, and exact in what follows: how far it is off counts as a residual.
+            // Here y is the right-hand side, and exact in what follows: its error counts as a residual.
             (0..2).for_each(|p| running.rho[*s][p] += self.mobility[last] * deviation[p]);
         }
         (value, deviation)
@@ -183,8 +183,8 @@ impl Solves {
         entries.map(|(size, mobility)| size * mobility).sum::<f64>() * GROWN
     }
 
-    /// The range of an entry of a right-hand side that is mixed with what makes y of it: all of y but what has
-    /// an entry of L as a factor, that is, y where every L is zero.
+    /// The range of an entry of a right-hand side that is mixed with what makes y of it: all of y but what
+    /// has an entry of L as a factor, that is, y where every L is zero.
     fn mixed(&self, k: usize, so_far: SoFar<'_>) -> Interval {
         let between = &self.between[k];
         let mut found: Vec<Interval> = Vec::with_capacity(between.len() + 1);
@@ -221,8 +221,8 @@ impl Solves {
         [self.moved(k, so_far, own, p), operands]
     }
 
-    /// How far an operand of `role` is off beyond what is taken as it was computed; `with` is the other factor
-    /// where it is one of a product.
+    /// How far an operand of `role` is off beyond what is taken as it was computed; `with` is the other
+    /// factor where it is one of a product.
     fn own(
         &self,
         role: Role,

@@ -333,8 +333,8 @@ fn no_acceleration_of_an_arm_without_rotors_is_further_off_than_its_bound() {
     }
 }
 
-/// The optimiser may mix a right-hand side with what the solve subtracts from it, so that no operation has its
-/// value: it counts all the same. One torque that is much larger than the others shows one that is left out.
+/// The optimiser may mix a right-hand side with what the solve subtracts from it, so that no operation has
+/// its value: it counts all the same. One torque much larger than the others shows one that is left out.
 #[test]
 fn every_entry_of_a_right_hand_side_counts() {
     for joint in 0..5 {
