@@ -27,7 +27,9 @@ fn a_body_on_a_bar_is_found_on_the_bar() {
     for seed in [3, 7, 11] {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let load = |log: usize| LOADED.contains(&log).then_some((ROD, LOAD));
-        let mut logs: Vec<Log> = (0..LOGS).map(|log| record(&arm, load(log), &mut rng)).collect();
+        let mut logs: Vec<Log> = (0..LOGS)
+            .map(|log| Log { file: format!("log{log}.csv"), ..record(&arm, load(log), &mut rng) })
+            .collect();
         common_clock(&mut logs);
         let (fit, validate) = logs.split_at(FITTED);
         let explained = explain_body(&body, fit, validate, &ExplainOptions::default()).unwrap();
