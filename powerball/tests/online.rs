@@ -7,7 +7,7 @@ use dyngen::arm::ParameterKind;
 use dyngen::{Model, SetKind};
 use nalgebra::SVector;
 use powerball::controller::online::SquareRoot;
-use powerball::identification::excite::{Settings, optimise};
+use powerball::identification::excite::{ExcitationSettings, optimise};
 use powerball::logs::regression::RigidArm;
 use powerball::virtual_arm::lwa4p;
 use rand::SeedableRng;
@@ -20,7 +20,7 @@ fn a_payload_is_weighed_in_two_seconds() {
     let arm = lwa4p::arm().unwrap();
     let body = RigidArm::new(&arm).unwrap();
     let model = Model::derive(arm.clone()).unwrap();
-    let settings = Settings { evaluations: 50, ..Settings::default() };
+    let settings = ExcitationSettings { evaluations: 50, ..ExcitationSettings::default() };
     let motion = optimise(&model, SetKind::Minimal, &settings).unwrap().paths[0].sample(200.0);
     let known: Vec<f64> = lwa4p::links().iter().flat_map(|link| link.parameters()).collect();
     let chosen: Vec<usize> = [ParameterKind::M, ParameterKind::Mx, ParameterKind::My, ParameterKind::Mz]

@@ -5,8 +5,8 @@ use crate::failure::{input, refused, value};
 use crate::work;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use powerball::identification::excite::{
-    CLEARANCE, Collision, Criterion, Error, ExciteOptions, FloorAt, MassSource, Mounting, RADIUS, Settings,
-    excite as search, searches,
+    CLEARANCE, Collision, Criterion, Error, ExcitationSettings, ExciteOptions, FloorAt, MassSource, Mounting,
+    RADIUS, excite as search, searches,
 };
 use powerball::identification::motion::Motion;
 use powerball::report;
@@ -122,7 +122,7 @@ pub(crate) fn excite(
     let found = work::run(py, progress.as_ref(), move |progress| {
         let options = ExciteOptions {
             parameters,
-            search: Settings {
+            search: ExcitationSettings {
                 harmonics: asked.harmonics,
                 fundamental: std::f64::consts::TAU / asked.period,
                 periods: asked.periods,

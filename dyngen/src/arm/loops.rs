@@ -19,7 +19,7 @@ const SAME: f64 = 1e-9;
 
 /// A loop as the file says it.
 struct Loop {
-    /// Its joints of the chain: one, or two neighbours.
+    /// The loop's joints of the chain: one, or two neighbours.
     first: usize,
     last: usize,
     /// The names of its other joints, from the outer link on.
@@ -300,7 +300,7 @@ impl Loop {
         })
     }
 
-    /// Its bars that are no links, from the outer link on.
+    /// The loop's bars that are no links, from the outer link on.
     fn bars(&self, convention: Convention, joints: &[Joint]) -> Vec<Bar> {
         let inner_link = self.first.checked_sub(1);
         let name = |from: usize| {

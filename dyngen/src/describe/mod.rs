@@ -38,7 +38,7 @@ pub struct Description {
 pub struct BoundsFor<'v> {
     /// Values of the minimal set; without them each parameter is within ±1 SI unit.
     pub values: Option<&'v [f64]>,
-    /// The same values in the full set, where they are known.
+    /// Values of the full set, where they are known.
     pub links: Option<&'v [f64]>,
     /// Whether products are formed within sums.
     pub contracted: bool,

@@ -34,7 +34,7 @@ pub struct BarBody {
     /// link back.
     file_turn: SinCos,
     last_turn: SinCos,
-    /// Its body about the pin, in the chain's axes of the link that it turns with.
+    /// The bar's body about the pin, in the chain's axes of the link that it turns with.
     moments: Moments<Expr>,
 }
 

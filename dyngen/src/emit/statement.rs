@@ -27,7 +27,7 @@ pub(super) enum Value {
 
 /// How the values of a graph are held.
 pub(super) struct Form {
-    /// Those of [`signs::held`].
+    /// The signs of [`signs::held`].
     signs: Vec<bool>,
     contraction: Contraction,
 }

@@ -14,7 +14,7 @@ const CORNERS: usize = 4;
 
 /// A parallelogram on the chain, at q = 0 in the root link's frame.
 pub(crate) struct ChainLoop {
-    /// Its first and last joint of the chain.
+    /// The loop's first and last joint of the chain.
     pub(crate) first: usize,
     pub(crate) last: usize,
     /// The names of its other pins, from the link behind it on.
@@ -24,7 +24,7 @@ pub(crate) struct ChainLoop {
     /// From the last joint of the chain to the first pin, and from the first joint to the last pin.
     pub(crate) outer: Vector3<f64>,
     pub(crate) inner: Vector3<f64>,
-    /// Its bars that are no links of the chain, in the order of the pins between them.
+    /// The loop's bars that are no links of the chain, in the order of the pins between them.
     pub(crate) bars: Vec<ChainBar>,
 }
 
@@ -88,35 +88,13 @@ pub(super) fn close(
         direction: None,
     });
     let chain = |k: usize| path.iter().copied().filter(|j| tree.moves(*j)).nth(k);
-    let (mut at, inner) = (chain(last), first.checked_sub(1).and_then(chain));
-    let (mut pins, mut bars): (Vec<Pin>, Vec<Option<usize>>) = (Vec::new(), Vec::new());
-    while let Some(k) = open.iter().position(|pin| pin.between.contains(&at)) {
-        let pin = open.swap_remove(k);
-        at = if pin.between[0] == at { pin.between[1] } else { pin.between[0] };
-        pins.push(pin);
-        bars.push(at);
-    }
-    if !open.is_empty() || at != inner {
-        return Err("its bars do not lead from the link behind the loop to the one before it".to_string());
-    }
-    bars.pop();
+    let (pins, bars) = in_order(open, chain(last), first.checked_sub(1).and_then(chain))
+        .ok_or("its bars do not lead from the link behind the loop to the one before it")?;
     let (first_joint, last_joint) = (&joints[first], &joints[last]);
-    let normal = first_joint.direction;
-    let flat = |v: Vector3<f64>| v - normal * normal.dot(&v);
-    let directions = pins.iter().filter_map(|pin| pin.direction).chain([last_joint.direction]);
-    if directions.into_iter().any(|d| d.cross(&normal).norm() > SAME) {
-        return Err("it is not planar: its hinges are not parallel".to_string());
-    }
     let own = if first == last { vec![first_joint.point] } else { vec![first_joint.point, last_joint.point] };
     let corners: Vec<Vector3<f64>> = own.into_iter().chain(pins.iter().map(|pin| pin.point)).collect();
-    let side = |k: usize| flat(corners[(k + 1) % CORNERS] - corners[k]);
-    if (side(0) + side(2)).norm() > SAME {
-        return Err("only loops whose opposite bars are equal and parallel are supported".to_string());
-    }
-    let lengths = std::array::from_fn(|k| side(k % 2).norm());
-    if lengths.iter().any(|length| *length < SAME) {
-        return Err("two of its hinges are at one place".to_string());
-    }
+    let directions = pins.iter().filter_map(|pin| pin.direction).chain([last_joint.direction]);
+    let sides = parallelogram(&corners, first_joint.direction, directions)?;
     let bar = |node: &Option<usize>| ChainBar { name: seen.name(*node), masses: seen.masses(*node) };
     let mut notes = Vec::new();
     for joint in of_bars.iter().map(|j| &tree.robot.joints[*j]) {
@@ -127,9 +105,9 @@ pub(super) fn close(
     let found = ChainLoop {
         first,
         last,
-        lengths,
-        outer: side(last - first),
-        inner: -side(CORNERS - 1),
+        lengths: std::array::from_fn(|k| sides[k % 2].norm()),
+        outer: sides[last - first],
+        inner: -sides[CORNERS - 1],
         bars: bars.iter().map(bar).collect(),
         pins: pins.into_iter().map(|pin| pin.name).collect(),
     };
@@ -139,6 +117,45 @@ pub(super) fn close(
         joints[last].follows.get_or_insert((first, mimic));
     }
     Ok((found, notes))
+}
+
+/// The pins of a loop from the link behind it to the one before it, and the bars between them; `None` where
+/// they do not lead there.
+fn in_order(
+    mut open: Vec<Pin>,
+    mut at: Option<usize>,
+    inner: Option<usize>,
+) -> Option<(Vec<Pin>, Vec<Option<usize>>)> {
+    let (mut pins, mut bars) = (Vec::new(), Vec::new());
+    while let Some(k) = open.iter().position(|pin| pin.between.contains(&at)) {
+        let pin = open.swap_remove(k);
+        at = if pin.between[0] == at { pin.between[1] } else { pin.between[0] };
+        pins.push(pin);
+        bars.push(at);
+    }
+    bars.pop();
+    (open.is_empty() && at == inner).then_some((pins, bars))
+}
+
+/// The sides of a parallelogram from corner to corner, in its plane, m; or why it is none.
+fn parallelogram(
+    corners: &[Vector3<f64>],
+    normal: Vector3<f64>,
+    mut directions: impl Iterator<Item = Vector3<f64>>,
+) -> Result<[Vector3<f64>; CORNERS], String> {
+    if directions.any(|d| d.cross(&normal).norm() > SAME) {
+        return Err("it is not planar: its hinges are not parallel".to_string());
+    }
+    let flat = |v: Vector3<f64>| v - normal * normal.dot(&v);
+    let sides: [Vector3<f64>; CORNERS] =
+        std::array::from_fn(|k| flat(corners[(k + 1) % CORNERS] - corners[k]));
+    if (sides[0] + sides[2]).norm() > SAME {
+        return Err("only loops whose opposite bars are equal and parallel are supported".to_string());
+    }
+    if sides[..2].iter().any(|side| side.norm() < SAME) {
+        return Err("two of its hinges are at one place".to_string());
+    }
+    Ok(sides)
 }
 
 /// The tree at q = 0.

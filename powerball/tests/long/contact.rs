@@ -9,7 +9,7 @@ use powerball::bus::driver::lwa4p::LWA4P;
 use powerball::bus::transport::{Master, Memory};
 use powerball::commands::{demo, model_arm};
 use powerball::controller::laws::{ComputedTorque, ContactDetector};
-use powerball::identification::excite::{self, Settings};
+use powerball::identification::excite::{self, ExcitationSettings};
 use powerball::logs::Progress;
 use powerball::procedure::Envelope;
 use powerball::procedure::follow::{Law, Path, Run, Track};
@@ -151,12 +151,12 @@ impl Study {
     fn path(&self, seed: u64) -> Path<6> {
         let model = self.model.body.model();
         for attempt in 0..8 {
-            let settings = Settings {
+            let settings = ExcitationSettings {
                 harmonics: 3,
                 fundamental: std::f64::consts::TAU / 5.0,
                 evaluations: 30,
                 seed: (self.demo.session.undeclared.age as u64) << 32 | (seed << 8) | attempt,
-                ..Settings::default()
+                ..ExcitationSettings::default()
             };
             let found = excite::optimise(model, SetKind::Minimal, &settings).unwrap();
             let rate = self.demo.session.plant.sensors().rate;

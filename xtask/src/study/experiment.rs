@@ -10,7 +10,7 @@ use dyngen::{Arm, Model, SetKind};
 use powerball::controller::friction::TanhFriction;
 use powerball::explanation::{ExplainOptions, explain_body};
 use powerball::identification::estimate::{Folds, fit, residual_stats};
-use powerball::identification::excite::{Settings, optimise};
+use powerball::identification::excite::{ExcitationSettings, optimise};
 use powerball::identification::motion::Motion;
 use powerball::logs::log::{Log, common_clock};
 use powerball::logs::regression::{Data, DataOptions, RigidArm, Signals};
@@ -253,13 +253,17 @@ impl Bench {
         plant = Plant::new(plant.dynamics().clone(), friction, sensors);
         let mut motions = Vec::new();
         for period in periods {
-            let settings = Settings {
+            let settings = ExcitationSettings {
                 harmonics: 5,
                 fundamental: TAU / period,
                 evaluations: EVALUATIONS,
                 seed: rng.random(),
-                margin: if case.table == Table::Alike { NARROW } else { Settings::default().margin },
-                ..Settings::default()
+                margin: if case.table == Table::Alike {
+                    NARROW
+                } else {
+                    ExcitationSettings::default().margin
+                },
+                ..ExcitationSettings::default()
             };
             let found = optimise(&self.model, SetKind::Minimal, &settings).map_err(|e| e.to_string())?;
             motions.push(found.paths[0].sample(plant.sensors().rate));

@@ -7,7 +7,7 @@ use dyngen::{Model, SetKind};
 use powerball::controller::change::Whitener;
 use powerball::explanation::torque_model::{Rows, TorqueModel};
 use powerball::explanation::watch::WatchOptions;
-use powerball::identification::excite::{Settings, optimise};
+use powerball::identification::excite::{ExcitationSettings, optimise};
 use powerball::identification::motion::Motion;
 use powerball::logs::log::Log;
 use powerball::logs::regression::{DataOptions, Recording, RigidArm};
@@ -39,7 +39,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), String> {
     let plant = lwa4p::plant().map_err(|e| e.to_string())?;
     let derived = Model::derive(arm.clone()).map_err(|e| e.to_string())?;
     let motion = |k: u64| -> Result<Motion, String> {
-        let settings = Settings { evaluations: 200, seed: 97 * arguments.seed + k, ..Settings::default() };
+        let settings = ExcitationSettings {
+            evaluations: 200,
+            seed: 97 * arguments.seed + k,
+            ..ExcitationSettings::default()
+        };
         let found = optimise(&derived, SetKind::Minimal, &settings).map_err(|e| e.to_string())?;
         Ok(found.paths[0].sample(RATE))
     };

@@ -84,7 +84,7 @@ impl Boot {
 pub(super) enum Script {
     /// Who the nodes are and what they offer is read.
     Identify,
-    /// They are configured.
+    /// Nodes are configured.
     Configure,
     /// The configuration is read back.
     Verify,

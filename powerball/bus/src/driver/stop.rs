@@ -181,7 +181,7 @@ const DIAGNOSIS: [Object; 4] =
 /// After a stop: the error details are read of the drive that caused it, if it was one.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Diagnosis {
-    /// Its joint, and how many objects were read.
+    /// The joint that is read, and how many objects were read.
     at: Option<(usize, usize)>,
 }
 

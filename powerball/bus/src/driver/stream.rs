@@ -15,7 +15,7 @@ pub(super) struct Stream {
     rejection: Option<Rejection>,
     /// Some were taken that have not left.
     pending: bool,
-    /// They ever came.
+    /// Set-points ever came.
     started: bool,
     /// Cycles in a row with rejected ones, and without any.
     rejected: u8,

@@ -8,7 +8,7 @@ use crate::cia402::State;
 use crate::driver::{Cause, Driver, Note, Phase};
 use powerball_controller::JointNumber;
 
-/// Their name in RUST_LOG: the part of `powerball` that users know.
+/// Name of these events in RUST_LOG: the part of `powerball` that users know.
 const EVENTS: &str = "powerball::bus";
 
 /// The state that the events have reported so far.

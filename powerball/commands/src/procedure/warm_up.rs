@@ -10,7 +10,7 @@ use std::io::{self, Write};
 
 /// How to swing, and when to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
+pub struct WarmUpSettings {
     /// Length of a cycle, s.
     pub period: f64,
     /// Share of each joint's range, velocity and acceleration that is used.
@@ -21,9 +21,9 @@ pub struct Settings {
     pub most: f64,
 }
 
-impl Default for Settings {
+impl Default for WarmUpSettings {
     fn default() -> Self {
-        Settings { period: 5.0, share: 0.6, tolerance: 0.01, most: 3600.0 }
+        WarmUpSettings { period: 5.0, share: 0.6, tolerance: 0.01, most: 3600.0 }
     }
 }
 
@@ -52,7 +52,7 @@ pub struct Warmth {
 /// One cycle of all joints, from rest to rest at one end of their swings: q = middle − A·cos ωt, so that
 /// cycles follow each other without a stop. Amplitudes keep the share of range, velocity and acceleration.
 #[must_use]
-pub fn swing<const N: usize>(profile: &Profile<N>, settings: &Settings) -> Motion {
+pub fn swing<const N: usize>(profile: &Profile<N>, settings: &WarmUpSettings) -> Motion {
     let period = profile.period_seconds();
     let steps = (settings.period / period).round().max(1.0);
     let w = std::f64::consts::TAU / (steps * period);
@@ -183,7 +183,7 @@ impl<W: Write> Write for Lines<'_, W> {
 /// Where the arm stops, or the log cannot be written.
 pub fn warm_up<B: Bus, const N: usize>(
     recorder: &mut Recorder<B, N>,
-    settings: &Settings,
+    settings: &WarmUpSettings,
     mut seen: Seen,
     start: f64,
     log: &mut impl Write,
@@ -251,7 +251,7 @@ mod tests {
         let mut recorder =
             Recorder::enable(Master::new(Driver::new(LWA4P).unwrap(), bus), Envelope::new(|_| None)).unwrap();
         let mut log = Vec::new();
-        let settings = Settings { most: 600.0, ..Settings::default() };
+        let settings = WarmUpSettings { most: 600.0, ..WarmUpSettings::default() };
         let seen = || Seen::new(swing(&LWA4P, &settings));
         let warmth = warm_up(&mut recorder, &settings, seen(), 0.0, &mut log, |_, _| ()).unwrap();
         assert!(warmth.warm && (120.0..500.0).contains(&warmth.seconds), "{}", warmth.seconds);
@@ -264,7 +264,7 @@ mod tests {
             text.lines().skip(1).map(|l| l.split(',').next().unwrap().parse().unwrap()).collect();
         assert!(times.windows(2).all(|w| w[1] > w[0]) && text.matches("tau1").count() == 1);
         // One that is given no time is not called warm.
-        let short = Settings { most: 20.0, ..settings };
+        let short = WarmUpSettings { most: 20.0, ..settings };
         assert!(!warm_up(&mut recorder, &short, seen(), 0.0, &mut Vec::new(), |_, _| ()).unwrap().warm);
         // The log holds all earlier results, except for a partial cycle; the log of another swing is not
         // used.
@@ -277,7 +277,7 @@ mod tests {
                 assert!((a.time - b.time).abs() < 1e-6 && a.torque == b.torque, "{a:?} {b:?}");
             }
         }
-        let wider = Settings { share: 0.9, ..settings };
+        let wider = WarmUpSettings { share: 0.9, ..settings };
         assert!(Seen::new(swing(&LWA4P, &wider)).earlier(&rows).is_none());
     }
 }

@@ -1,7 +1,7 @@
 //! An excitation as JSON and as a page: the motion of the arm, and how it keeps its limits.
 
 use crate::report::{Figure, Ink, JOINTS, Page, Panel, Series, Table, number};
-use powerball_identification::excite::{Excited, Figures, Fourier, Trajectory};
+use powerball_identification::excite::{Conditioning, Excited, Fourier, Trajectory};
 use powerball_logs::motion::Motion;
 use serde_json::{Value, json};
 
@@ -87,7 +87,7 @@ fn distances(trajectory: &Trajectory) -> Option<Figure> {
 /// One JSON object of all that is reported; the list `trajectories` where there are several.
 #[must_use]
 pub fn json(excited: &Excited) -> Value {
-    let figures = |f: &Figures| json!({"condition": f.condition, "least_singular_value": f.least, "mean_singular_value": f.mean});
+    let figures = |f: &Conditioning| json!({"condition": f.condition, "least_singular_value": f.least, "mean_singular_value": f.mean});
     let trajectory = |(trajectory, path): (&Trajectory, &Fourier)| {
         let torque = trajectory.tightest.torque.as_ref();
         let joints: Vec<Value> = peaks(&trajectory.motion)

@@ -191,7 +191,7 @@ fn friction_may_wander_within_its_range() {
     assert!(mean_time(1, Law::Normal, 0.0, &|_, k| 3.0 * RANGE * friction(k)) < 0.5 * LEVEL);
 }
 
-/// It is known when a change began and where, and on several joints it adds up: the bet on all of them finds
+/// When a change began and where is known, and on several joints it adds up: the bet on all of them finds
 /// it first.
 #[test]
 fn a_change_is_seen_where_and_when_it_is() {

@@ -5,7 +5,7 @@ use super::windows::{Sums, best_run, by_log, cut, explained, rests, step_start, 
 use super::words::{Words, list, number};
 use super::{Axis, Candidate, Class, Context, Effect, Found, Part, Window};
 use powerball_controller::JointNumber;
-use powerball_logs::regression::{Column, RigidArm};
+use powerball_logs::regression::{Block, Column, RigidArm};
 use serde::Serialize;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -203,58 +203,28 @@ impl Effect for ContactWrench {
 /// rest, where an error comes from the start itself: a push that lasts longer is found from then on. A whole
 /// log is tried where the arm feels no weight.
 fn search(context: &Context<'_>) -> Option<Vec<Candidate>> {
-    let (data, fit) = (context.data, context.fit);
-    let columns = data.force_columns();
-    if columns.len() < 3 {
+    let data = context.data;
+    if data.force_columns().len() < 3 {
         return None;
     }
-    let solver = fit.solver();
     let steps = data.blocks_of(GRID);
     let rests = rests(context, &steps, GRID);
-    let heavy = feels_weight(context);
-    let sets_off: Vec<bool> = (steps.iter())
-        .map(|step| {
-            step_start(context, step).is_none_or(|start| sets_off(&rests, &data.logs[step.log], start))
-        })
-        .collect();
     let logs = by_log(&steps);
-    let mut before = vec![Sums::zero(&solver, 3)];
-    for step in &steps {
-        let mut sum = before[before.len() - 1].clone();
-        sum.add(&Sums::of_block(context, &solver, columns, step));
-        before.push(sum);
-    }
-    let mut searched = 0.0;
-    let mut best: Option<(f64, Range<usize>)> = None;
-    let mut consider = |window: Range<usize>, best: &mut Option<(f64, Range<usize>)>| {
-        if sets_off[window.start] && (heavy || !logs.contains(&window)) {
-            return;
-        }
-        let mut sums = before[window.end].clone();
-        sums.subtract(&before[window.start]);
-        searched += 1.0;
-        let (gain, force) = sums.gain();
-        if gain > best.as_ref().map_or(0.0, |(g, _)| *g) && force.iter().all(|f| f.abs() < MOST) {
-            *best = Some((gain, window));
-        }
-    };
+    let mut windows = Windows::new(context, &steps, &rests);
+    let heavy = windows.heavy;
     for log in &logs {
-        for first in log.clone() {
-            for end in first + 1..=(first + SHORT).min(log.end) {
-                consider(first..end, &mut best);
-            }
-        }
+        windows.try_all(log, SHORT);
         if !heavy {
-            consider(log.clone(), &mut best);
+            windows.consider(log.clone());
         }
         let inner = inner(log, heavy);
         for first in inner.clone().step_by(COARSE) {
             for end in (first + SHORT + 1..=inner.end).step_by(COARSE) {
-                consider(first..end, &mut best);
+                windows.consider(first..end);
             }
         }
     }
-    let (_, coarse) = best.clone()?;
+    let (_, coarse) = windows.best.clone()?;
     let log = logs.iter().find(|log| log.contains(&coarse.start))?;
     if coarse.len() > SHORT {
         let inner = inner(log, heavy);
@@ -262,32 +232,96 @@ fn search(context: &Context<'_>) -> Option<Vec<Candidate>> {
             |at: usize| at.saturating_sub(COARSE - 1).max(inner.start)..(at + COARSE).min(inner.end + 1);
         for first in near(coarse.start) {
             for end in near(coarse.end) {
-                consider(first..end, &mut best);
+                windows.consider(first..end);
             }
         }
     }
-    let (mut gain, mut found) = best?;
-    // Two pushes with a pause are two: one that explains most of a window in half of its time is taken by
-    // itself, and the other one is found after it.
-    while found.len() > 1 {
-        let longest = found.len().div_ceil(2);
-        let mut part = None;
-        for first in found.clone() {
-            for end in first + 1..=(first + longest).min(found.end) {
-                consider(first..end, &mut part);
-            }
-        }
-        match part.filter(|(own, _)| *own > ALONE * gain) {
-            Some((own, window)) => (gain, found) = (own, window),
-            None => break,
-        }
-    }
+    let found = windows.alone()?;
+    let searched = windows.searched;
     let windows = vec![window(context, &steps, log, &found)?];
     let constant =
         Candidate { joints: all_joints(data), settings: Settings::Constant.into(), windows, searched };
     let pushes = pushes(context, &constant, &rests);
     let searched = searched + pushes.len() as f64;
     Some(std::iter::once(constant).chain(pushes).map(|c| Candidate { searched, ..c }).collect())
+}
+
+/// The windows of a search, in steps, and the best of those that were tried.
+struct Windows {
+    /// Sums up to each step.
+    before: Vec<Sums>,
+    /// Whether the arm rests or sets off in each step.
+    sets_off: Vec<bool>,
+    /// The steps of each log.
+    logs: Vec<Range<usize>>,
+    /// Whether the arm feels weight.
+    heavy: bool,
+    searched: f64,
+    /// The largest gain and its window.
+    best: Option<(f64, Range<usize>)>,
+}
+
+impl Windows {
+    fn new(context: &Context<'_>, steps: &[Block], rests: &[Window]) -> Windows {
+        let (data, solver) = (context.data, context.fit.solver());
+        let columns = data.force_columns();
+        let sets_off = (steps.iter())
+            .map(|step| {
+                step_start(context, step).is_none_or(|start| sets_off(rests, &data.logs[step.log], start))
+            })
+            .collect();
+        let mut before = vec![Sums::zero(&solver, 3)];
+        for step in steps {
+            let mut sum = before[before.len() - 1].clone();
+            sum.add(&Sums::of_block(context, &solver, columns, step));
+            before.push(sum);
+        }
+        let heavy = feels_weight(context);
+        Windows { before, sets_off, logs: by_log(steps), heavy, searched: 0.0, best: None }
+    }
+
+    /// The gain of a constant force in a window; `None` where none may be, or where it is too large.
+    fn gain(&mut self, window: &Range<usize>) -> Option<f64> {
+        if self.sets_off[window.start] && (self.heavy || !self.logs.contains(window)) {
+            return None;
+        }
+        let mut sums = self.before[window.end].clone();
+        sums.subtract(&self.before[window.start]);
+        self.searched += 1.0;
+        let (gain, force) = sums.gain();
+        force.iter().all(|f| f.abs() < MOST).then_some(gain)
+    }
+
+    /// Takes a window if it is the best so far.
+    fn consider(&mut self, window: Range<usize>) {
+        let best = self.best.as_ref().map_or(0.0, |(gain, _)| *gain);
+        if let Some(gain) = self.gain(&window).filter(|gain| *gain > best) {
+            self.best = Some((gain, window));
+        }
+    }
+
+    /// Tries all windows in a range of steps that have at most `longest` of them.
+    fn try_all(&mut self, range: &Range<usize>, longest: usize) {
+        for first in range.clone() {
+            for end in first + 1..=(first + longest).min(range.end) {
+                self.consider(first..end);
+            }
+        }
+    }
+
+    /// The best window. Two pushes with a pause are two: one that explains most of a window in half of its
+    /// time is taken by itself, and the other one is found after it.
+    fn alone(&mut self) -> Option<Range<usize>> {
+        let (mut gain, mut found) = self.best.take()?;
+        while found.len() > 1 {
+            self.try_all(&found, found.len().div_ceil(2));
+            match self.best.take().filter(|(own, _)| *own > ALONE * gain) {
+                Some((own, window)) => (gain, found) = (own, window),
+                None => break,
+            }
+        }
+        Some(found)
+    }
 }
 
 /// Whether an arm rests or sets off at a time of a log.

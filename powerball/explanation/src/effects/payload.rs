@@ -222,7 +222,7 @@ impl Effect for Payload {
         (c[0] > 0.0).then(|| candidate.with(Settings { com: Some(com()), ..*settings }))
     }
 
-    /// Its mass in the hand, the length of its first moment on another link.
+    /// A body's mass in the hand, the length of its first moment on another link.
     fn size(&self, candidate: &Candidate, c: &[f64]) -> Option<Vec<f64>> {
         let mut gradient = vec![0.0; c.len()];
         match Settings::of(candidate)?.link {

@@ -10,7 +10,7 @@
 use crate::explain::{Hypothesis, Open};
 use faer::Mat;
 use powerball_identification::estimate::{Design, Folds, Gram, Solver};
-use powerball_identification::excite::{Error, Fourier, Limits, Settings, search};
+use powerball_identification::excite::{Error, ExcitationSettings, Fourier, Limits, search};
 use powerball_logs::log::Log;
 use powerball_logs::motion::Motion;
 use powerball_logs::regression::{Column, Data, DataOptions, RigidArm, Signals};
@@ -37,13 +37,13 @@ const RATE: f64 = 200.0;
 const COARSE: f64 = 50.0;
 
 /// One period without a repeat, so that its end is another path than its beginning; harmonics up to 0.5 Hz.
-fn settings() -> Settings {
-    Settings {
+fn settings() -> ExcitationSettings {
+    ExcitationSettings {
         harmonics: 10,
         fundamental: std::f64::consts::TAU / 20.0,
         periods: 1,
         evaluations: 160,
-        ..Settings::default()
+        ..ExcitationSettings::default()
     }
 }
 

@@ -6,7 +6,7 @@ use crate::ExplainOptions;
 use crate::explain::{Explained, explain_body};
 use dyngen::{Model, SetKind};
 use powerball_controller::JointNumber;
-use powerball_identification::excite::{Limits, Settings, optimise};
+use powerball_identification::excite::{ExcitationSettings, Limits, optimise};
 use powerball_logs::log::{Log, common_clock};
 use powerball_logs::motion::Motion;
 use powerball_logs::regression::RigidArm;
@@ -17,8 +17,13 @@ fn session(plant: &Plant, body: &RigidArm) -> (Vec<Log>, Vec<Log>, Explained) {
     let model = Model::derive(lwa4p::arm().unwrap()).unwrap();
     let mut logs: Vec<Log> = (0..5)
         .map(|seed| {
-            let settings =
-                Settings { margin: 0.8, harmonics: 5, evaluations: 60, seed, ..Settings::default() };
+            let settings = ExcitationSettings {
+                margin: 0.8,
+                harmonics: 5,
+                evaluations: 60,
+                seed,
+                ..ExcitationSettings::default()
+            };
             let path = optimise(&model, SetKind::Minimal, &settings).unwrap().paths.swap_remove(0);
             log(plant, &path.sample(200.0), seed)
         })

@@ -30,7 +30,7 @@ struct Logged {
 }
 
 impl Plant {
-    /// Its log at 100 Hz, `clock` seconds after it was cold; at the end of it the drive is switched off.
+    /// A log at 100 Hz, `clock` seconds after it was cold; at the end of it the drive is switched off.
     fn run(&self, seconds: f64, clock: f64, goal: impl Fn(f64) -> f64) -> Logged {
         let (h, torque, back_emf, rotor, gain, delay) = (2e-5, 6.0, 0.6, 0.02, 2.9, 0.02);
         let mut log = Logged::default();

@@ -110,12 +110,14 @@ impl Differences {
             // One of twenty that is far off by itself is noise where all together are not.
             differs: d.p_value() < each && inertia.p_value < 2.0 * share,
         });
+        let parameters = parameters.collect();
         let constants = constants.into_iter().map(|(j, own, other)| {
             let d = Difference::of(own, other);
+            let p_value = d.p_value();
+            let (joint, interval) = (j + 1, d.interval(p));
             let [a, b] = [own.0, other.0];
-            let (interval, p_value) = (d.interval(p), d.p_value());
             ConstantDifference {
-                joint: j + 1,
+                joint,
                 a,
                 b,
                 difference: d.value,
@@ -124,36 +126,39 @@ impl Differences {
                 differs: p_value < share,
             }
         });
+        let constants = constants.collect();
         let torque = torque(a, b, &place);
-        // A curve that is another one, where all torques together are the same, is what another parameter of
-        // the fit made up for; one of less than no friction is no friction.
-        let shows = |f: &FrictionDifference| {
-            f.change[1] > -1.0
-                && torque.iter().find(|t| t.joint == f.joint).is_none_or(|t| t.rms > t.expected)
-        };
-        let on_one_path = changes(&a.strokes, &b.strokes);
-        let friction = friction.iter().map(|curves| {
-            let f = curves.difference(p, share);
-            match on_one_path.get(f.joint - 1).copied().flatten() {
-                Some(change) => {
-                    let (p_value, change) = (change.p_value(), change.interval(share));
-                    FrictionDifference { p_value, change, differs: p_value < share, ..f }
-                }
-                None => FrictionDifference { differs: f.differs && shows(&f), ..f },
-            }
-        });
-        let friction = friction.collect();
-        Ok(Differences {
-            level,
-            comparisons,
-            parameters: parameters.collect(),
-            inertia,
-            friction,
-            constants: constants.collect(),
-            torque,
-            warnings,
-        })
+        let friction = friction_differences(&friction, [a, b], &torque, p, share);
+        Ok(Differences { level, comparisons, parameters, inertia, friction, constants, torque, warnings })
     }
+}
+
+/// The difference of each joint's friction, by the strokes of one path where both fits have one, else by the
+/// curves.
+fn friction_differences(
+    curves: &[Curves],
+    [a, b]: [&Side; 2],
+    torque: &[TorqueDifference],
+    p: f64,
+    share: f64,
+) -> Vec<FrictionDifference> {
+    // A curve that is another one, where all torques together are the same, is what another parameter of
+    // the fit made up for; one of less than no friction is no friction.
+    let shows = |f: &FrictionDifference| {
+        f.change[1] > -1.0 && torque.iter().find(|t| t.joint == f.joint).is_none_or(|t| t.rms > t.expected)
+    };
+    let on_one_path = changes(&a.strokes, &b.strokes);
+    let difference = |curves: &Curves| {
+        let f = curves.difference(p, share);
+        match on_one_path.get(f.joint - 1).copied().flatten() {
+            Some(change) => {
+                let (p_value, change) = (change.p_value(), change.interval(share));
+                FrictionDifference { p_value, change, differs: p_value < share, ..f }
+            }
+            None => FrictionDifference { differs: f.differs && shows(&f), ..f },
+        }
+    };
+    curves.iter().map(difference).collect()
 }
 
 /// The place in `b` of every parameter of `a`.

@@ -80,15 +80,54 @@ pub fn nearest(model: &Model, kind: SetKind, values: &[f64], metric: &Mat<f64>) 
     let arm = model.arm();
     let set = model.set(kind)?;
     let kept: Vec<Parameter> = arm.kept_parameters();
-    let column = |p: &Parameter| kept.iter().position(|k| k == p);
     let mut sums = Mat::<f64>::zeros(values.len(), kept.len());
     for (row, parameter) in set.parameters.iter().enumerate() {
         for (p, c) in &parameter.terms {
-            if let Some(k) = column(p) {
+            if let Some(k) = kept.iter().position(|k| k == p) {
                 sums[(row, k)] += model.sets().field.value(c);
             }
         }
     }
+    let (problem, mut x, without_body) = ordinary_arm(arm, &kept, sums, metric);
+    let mut weight = FIRST;
+    loop {
+        problem.descend(&mut x, values, metric, weight);
+        if weight <= LAST {
+            break;
+        }
+        weight = (weight * FALL).max(LAST);
+    }
+    let set_values = times(&problem.sums, &x);
+    let miss: Vec<f64> = set_values.iter().zip(values).map(|(a, b)| a - b).collect();
+    let mut all = vec![0.0; arm.all_parameters().len()];
+    for (p, value) in kept.iter().zip(&x) {
+        all[p.index()] = *value;
+    }
+    let eigenvalues = all
+        .chunks_exact(PER_LINK)
+        .filter_map(|link| link.first_chunk::<10>())
+        .map(|link| pseudo_inertia(link).symmetric_eigenvalues().min())
+        .collect();
+    Ok(Consistent {
+        distance: dot(&miss, &times(metric, &miss)),
+        // ½ of the distance is what the barrier's bound holds for.
+        gap: 2.0 * weight * (4 * problem.links.len() + problem.rotors.len()) as f64,
+        all,
+        set: set_values,
+        eigenvalues,
+        without_body,
+    })
+}
+
+/// The problem and where its descent starts: an arm of ordinary bodies. The last value has the links to which
+/// the kept parameters give no body.
+fn ordinary_arm(
+    arm: &Arm,
+    kept: &[Parameter],
+    sums: Mat<f64>,
+    metric: &Mat<f64>,
+) -> (Problem, Vec<f64>, Vec<usize>) {
+    let column = |p: &Parameter| kept.iter().position(|k| k == p);
     let mut problem =
         Problem { curvature: sums.transpose() * metric * &sums, sums, links: Vec::new(), rotors: Vec::new() };
     let mut x = vec![0.0; kept.len()];
@@ -131,34 +170,7 @@ pub fn nearest(model: &Model, kind: SetKind, values: &[f64], metric: &Mat<f64>) 
             problem.rotors.push((k, ordinary));
         }
     }
-    let mut weight = FIRST;
-    loop {
-        problem.descend(&mut x, values, metric, weight);
-        if weight <= LAST {
-            break;
-        }
-        weight = (weight * FALL).max(LAST);
-    }
-    let set_values = times(&problem.sums, &x);
-    let miss: Vec<f64> = set_values.iter().zip(values).map(|(a, b)| a - b).collect();
-    let mut all = vec![0.0; arm.all_parameters().len()];
-    for (p, value) in kept.iter().zip(&x) {
-        all[p.index()] = *value;
-    }
-    let eigenvalues = all
-        .chunks_exact(PER_LINK)
-        .filter_map(|link| link.first_chunk::<10>())
-        .map(|link| pseudo_inertia(link).symmetric_eigenvalues().min())
-        .collect();
-    Ok(Consistent {
-        distance: dot(&miss, &times(metric, &miss)),
-        // ½ of the distance is what the barrier's bound holds for.
-        gap: 2.0 * weight * (4 * problem.links.len() + problem.rotors.len()) as f64,
-        all,
-        set: set_values,
-        eigenvalues,
-        without_body,
-    })
+    (problem, x, without_body)
 }
 
 /// The pseudo-inertia of a rotor of unit inertia on the link before: a ring about the joint's axis, in that

@@ -205,10 +205,33 @@ pub fn solve_instrumental(
             Some((global, octaves)) => octaves.levels().iter().map(|t| Level::new(t, global)).collect(),
         })
         .collect();
-    // Z'A and Z'y, summed over joints.
+    let (inverse, found) = solve_moments(&levels, &start.weights, &place, size)?;
+    let mut theta = vec![0.0; layout.size()];
+    free.iter().enumerate().for_each(|(i, c)| theta[*c] = found[(i, 0)]);
+    let errors = standard_errors(&levels, start, &inverse, &theta, &free, &place);
+    let solution = Solution {
+        layout,
+        identity: start.identity.clone(),
+        shapes: start.shapes.clone(),
+        theta,
+        weights: start.weights.clone(),
+        bands: start.bands.clone(),
+        free: (0..layout.size()).map(|c| place[c].is_some()).collect(),
+        parts: levels.into_iter().map(|j| j.into_iter().map(|l| l.part).collect()).collect(),
+    };
+    Ok((solution, errors))
+}
+
+/// (ZᵀA)⁻¹, and the parameters (ZᵀA)⁻¹ Zᵀy, both summed over joints.
+fn solve_moments(
+    levels: &[Vec<Level>],
+    weights: &[f64],
+    place: &[Option<usize>],
+    size: usize,
+) -> Result<(Mat<f64>, Mat<f64>), String> {
     let (mut moments, mut right) = (Mat::<f64>::zeros(size, size), Mat::<f64>::zeros(size, 1));
-    for (level, weight) in weighted(&levels, &start.weights) {
-        let (za, zy) = level.moments(&place, size);
+    for (level, weight) in weighted(levels, weights) {
+        let (za, zy) = level.moments(place, size);
         moments += za * faer::Scale(weight);
         right += zy * faer::Scale(weight);
     }
@@ -223,8 +246,19 @@ pub fn solve_instrumental(
             "the instruments do not determine the parameters: record a motion that excites them".into()
         );
     }
-    let mut theta = vec![0.0; layout.size()];
-    free.iter().enumerate().for_each(|(i, c)| theta[*c] = found[(i, 0)]);
+    Ok((inverse, found))
+}
+
+/// Standard errors under noise that is deconvolved from what each octave leaves.
+fn standard_errors(
+    levels: &[Vec<Level>],
+    start: &Solution,
+    inverse: &Mat<f64>,
+    theta: &[f64],
+    free: &[usize],
+    place: &[Option<usize>],
+) -> StandardErrors {
+    let (layout, size) = (start.layout, free.len());
     let (mut std, mut quantile) = (vec![None; layout.size()], vec![0.0; layout.size()]);
     let mut sums = vec![(0.0, 0.0); size];
     let mut covariance = Mat::<f64>::zeros(layout.size(), layout.size());
@@ -234,16 +268,16 @@ pub fn solve_instrumental(
             .enumerate()
             .filter(|(_, level)| level.part.rows > 0)
             .map(|(octave, level)| {
-                let (za, _) = level.moments(&place, size);
-                let turned = &inverse * &za;
+                let (za, _) = level.moments(place, size);
+                let turned = inverse * &za;
                 let taken = weight * (0..size).map(|i| turned[(i, i)]).sum::<f64>();
                 let freedom = (level.part.rows as f64 - taken).max(1.0);
-                (level, Power { octave, mean: level.part.left(&theta) / freedom, freedom })
+                (level, Power { octave, mean: level.part.left(theta) / freedom, freedom })
             })
             .collect();
         let sharp = deconvolved(&known.iter().map(|(_, power)| *power).collect::<Vec<_>>());
         for ((level, Power { freedom, .. }), power) in known.into_iter().zip(sharp) {
-            let inverse_square = &inverse * level.instrument_products(&place, size) * inverse.transpose();
+            let inverse_square = inverse * level.instrument_products(place, size) * inverse.transpose();
             for (i, (variance, doubt)) in sums.iter_mut().enumerate() {
                 let share = weight * weight * power * inverse_square[(i, i)].max(0.0);
                 *variance += share;
@@ -259,17 +293,7 @@ pub fn solve_instrumental(
         let freedom = if *doubt > 0.0 { variance * variance / doubt } else { f64::from(u16::MAX) };
         quantile[*c] = t_quantile_975(freedom.max(1.0));
     }
-    let solution = Solution {
-        layout,
-        identity: start.identity.clone(),
-        shapes: start.shapes.clone(),
-        theta,
-        weights: start.weights.clone(),
-        bands: start.bands.clone(),
-        free: (0..layout.size()).map(|c| place[c].is_some()).collect(),
-        parts: levels.into_iter().map(|j| j.into_iter().map(|l| l.part).collect()).collect(),
-    };
-    Ok((solution, StandardErrors { std, quantile, covariance }))
+    StandardErrors { std, quantile, covariance }
 }
 
 /// By joint, where it moves: the model's columns by their index, and the rows [Z A y].

@@ -18,8 +18,10 @@ pub use constraints::{
 };
 pub use fourier::{Fourier, Harmonics};
 pub use load::{Load, Masses};
-pub use objective::{Conditions, Criterion, Figures, Objective};
-pub use search::{Excitation, SEARCH, Settings, Task, optimise, optimise_all, search, search_all, searches};
+pub use objective::{Conditioning, Conditions, Criterion, Objective};
+pub use search::{
+    Excitation, ExcitationSettings, SEARCH, Task, optimise, optimise_all, search, search_all, searches,
+};
 pub use shape::{Contact, Floor, Nearness, Shape};
 pub use trajectories::{Collision, ExciteOptions, Excited, MassSource, Trajectory, excite};
 

@@ -15,7 +15,7 @@ use rand::{RngExt, SeedableRng};
 /// The figures of a path. Both refer to the regressor with its rows divided by the joints' largest torques
 /// and its columns by their usual size, so that they have no units.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Figures {
+pub struct Conditioning {
     /// Largest over smallest singular value.
     pub condition: f64,
     /// Smallest singular value for one row, σ_p / √rows.
@@ -36,7 +36,7 @@ pub enum Criterion {
     Volume,
 }
 
-impl Figures {
+impl Conditioning {
     /// The value that the search minimises.
     #[must_use]
     pub fn objective(&self, criterion: Criterion) -> f64 {
@@ -47,20 +47,20 @@ impl Figures {
     }
 
     /// From the squares of the singular values, ascending, of which the first `dependent` count as zero.
-    fn of(squares: &[f64], dependent: usize) -> Figures {
+    fn of(squares: &[f64], dependent: usize) -> Conditioning {
         let singular: Vec<f64> = squares[dependent..].iter().map(|s| s.max(0.0).sqrt()).collect();
         match (singular.last(), singular.first()) {
-            (Some(largest), Some(least)) if *least > 0.0 => Figures {
+            (Some(largest), Some(least)) if *least > 0.0 => Conditioning {
                 condition: largest / least,
                 least: *least,
                 mean: (singular.iter().map(|s| s.ln()).sum::<f64>() / singular.len() as f64).exp(),
             },
-            _ => Figures::NOTHING,
+            _ => Conditioning::NOTHING,
         }
     }
 
     /// The figures of a path that does not determine the parameters, or that was not evaluated.
-    pub const NOTHING: Figures = Figures { condition: f64::INFINITY, least: 0.0, mean: 0.0 };
+    pub const NOTHING: Conditioning = Conditioning { condition: f64::INFINITY, least: 0.0, mean: 0.0 };
 }
 
 /// Condition numbers as publications give them.
@@ -189,7 +189,7 @@ impl Objective {
 
     /// The figures of a path for each mounting, together.
     #[must_use]
-    pub fn judge(&self, paths: &[Fourier]) -> Figures {
+    pub fn judge(&self, paths: &[Fourier]) -> Conditioning {
         self.figures(&self.gram(paths))
     }
 
@@ -211,10 +211,10 @@ impl Objective {
     }
 
     /// Where the set's columns are dependent, only as many count as there are independent ones.
-    fn figures(&self, gram: &Mat<f64>) -> Figures {
+    fn figures(&self, gram: &Mat<f64>) -> Conditioning {
         match gram.self_adjoint_eigenvalues(faer::Side::Lower) {
-            Ok(squares) => Figures::of(&squares, self.columns - self.rank),
-            Err(_) => Figures::NOTHING,
+            Ok(squares) => Conditioning::of(&squares, self.columns - self.rank),
+            Err(_) => Conditioning::NOTHING,
         }
     }
 

@@ -4,7 +4,7 @@
 use super::Error;
 use super::constraints::{Constraints, Limits};
 use super::fourier::{Fourier, Harmonics};
-use super::objective::{Criterion, Figures, Objective};
+use super::objective::{Conditioning, Criterion, Objective};
 use super::shape::poses;
 use chacha20::ChaCha8Rng;
 use dyngen::{Model, SetKind};
@@ -19,9 +19,9 @@ const PLACES: usize = 50;
 /// Samples a second at which found paths are compared.
 const JUDGED: f64 = 50.0;
 
-/// Settings of the path and of its search.
+/// Settings of an exciting path and of its search.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
+pub struct ExcitationSettings {
     /// Number of harmonics N of each joint.
     pub harmonics: usize,
     /// Fundamental frequency ω_f, rad/s.
@@ -53,10 +53,10 @@ pub fn searches(evaluations: usize) -> usize {
     (evaluations / SEARCH).max(1)
 }
 
-impl Default for Settings {
+impl Default for ExcitationSettings {
     /// The paper's N = 4 and ω_f = 2π/10.
     fn default() -> Self {
-        Settings {
+        ExcitationSettings {
             harmonics: 4,
             fundamental: std::f64::consts::TAU / 10.0,
             periods: 2,
@@ -76,9 +76,9 @@ pub struct Excitation {
     /// The paths.
     pub paths: Vec<Fourier>,
     /// The figures of all paths together.
-    pub figures: Figures,
+    pub figures: Conditioning,
     /// The figures of the middle one of the random starts, for comparison.
-    pub usual: Figures,
+    pub usual: Conditioning,
 }
 
 /// An arm as it is mounted for a path, and the constraints of the path.
@@ -125,7 +125,7 @@ impl<J> Judged<J> {
 ///
 /// # Errors
 /// Those of [`optimise_all`].
-pub fn optimise(model: &Model, kind: SetKind, settings: &Settings) -> Result<Excitation, Error> {
+pub fn optimise(model: &Model, kind: SetKind, settings: &ExcitationSettings) -> Result<Excitation, Error> {
     check(settings)?;
     let constraints = Constraints::of(Limits::of(model.arm(), settings.margin)?);
     optimise_all(&[Task { model, constraints }], kind, settings)
@@ -135,7 +135,11 @@ pub fn optimise(model: &Model, kind: SetKind, settings: &Settings) -> Result<Exc
 ///
 /// # Errors
 /// A set that has no regressor, and those of [`search_all`].
-pub fn optimise_all(tasks: &[Task<'_>], kind: SetKind, settings: &Settings) -> Result<Excitation, Error> {
+pub fn optimise_all(
+    tasks: &[Task<'_>],
+    kind: SetKind,
+    settings: &ExcitationSettings,
+) -> Result<Excitation, Error> {
     check(settings)?;
     let models: Vec<&Model> = tasks.iter().map(|task| task.model).collect();
     // Eight instants for each period of the highest harmonic resolve its regressor.
@@ -150,8 +154,10 @@ pub fn optimise_all(tasks: &[Task<'_>], kind: SetKind, settings: &Settings) -> R
         })
         .collect();
     objective.scale_columns(&typical);
-    let share =
-        Settings { evaluations: settings.evaluations.div_ceil(settings.searches), ..settings.clone() };
+    let share = ExcitationSettings {
+        evaluations: settings.evaluations.div_ceil(settings.searches),
+        ..settings.clone()
+    };
     let streams: Vec<u64> = (0..settings.searches as u64).collect();
     let found = parallel::map(&streams, |stream| {
         search_from(*stream, &constraints, &share, |paths| {
@@ -161,7 +167,7 @@ pub fn optimise_all(tasks: &[Task<'_>], kind: SetKind, settings: &Settings) -> R
     });
     // Of what the searches found for Eq. 17 the best is taken by a condition number that no scale of rows or
     // columns changes.
-    let value = |paths: &[Fourier], figures: &Figures| match settings.criterion {
+    let value = |paths: &[Fourier], figures: &Conditioning| match settings.criterion {
         Criterion::Condition { .. } if settings.searches > 1 => {
             let motions: Vec<_> = paths.iter().map(|path| path.sample(JUDGED)).collect();
             objective.conditions(&motions).normalised
@@ -189,7 +195,7 @@ pub fn optimise_all(tasks: &[Task<'_>], kind: SetKind, settings: &Settings) -> R
 /// # Errors
 /// Those of [`search_all`].
 pub fn search<J: Clone>(
-    settings: &Settings,
+    settings: &ExcitationSettings,
     limits: &Limits,
     mut judge: impl FnMut(&Fourier) -> (f64, J),
 ) -> Result<(Fourier, J, J), Error> {
@@ -206,7 +212,7 @@ pub fn search<J: Clone>(
 /// that keeps the constraints was found.
 pub fn search_all<J: Clone>(
     constraints: &[&Constraints],
-    settings: &Settings,
+    settings: &ExcitationSettings,
     judge: impl FnMut(&[Fourier]) -> (f64, J),
 ) -> Result<(Vec<Fourier>, J, J), Error> {
     check(settings)?;
@@ -217,7 +223,7 @@ pub fn search_all<J: Clone>(
 fn search_from<J: Clone>(
     stream: u64,
     constraints: &[&Constraints],
-    settings: &Settings,
+    settings: &ExcitationSettings,
     mut judge: impl FnMut(&[Fourier]) -> (f64, J),
 ) -> Result<(Vec<Fourier>, J, J), Error> {
     if constraints.iter().any(|c| poses(&c.limits.0).all(|q| c.lacks(&q) > 0.0)) {
@@ -305,7 +311,7 @@ fn improved<J>(
     (judged.rank() < best.rank()).then_some(judged)
 }
 
-fn check(settings: &Settings) -> Result<(), Error> {
+fn check(settings: &ExcitationSettings) -> Result<(), Error> {
     let wrong = |what: &str| Err(Error::Setting(what.to_string()));
     if [settings.harmonics, settings.periods, settings.evaluations, settings.searches].contains(&0) {
         return wrong("the numbers of harmonics, periods, evaluations and searches must be at least 1");
@@ -329,7 +335,7 @@ fn check(settings: &Settings) -> Result<(), Error> {
 
 impl Candidate {
     /// A random path; where there are surroundings, about a pose that is free if one of many is.
-    fn random(constraints: &Constraints, settings: &Settings, rng: &mut ChaCha8Rng) -> Candidate {
+    fn random(constraints: &Constraints, settings: &ExcitationSettings, rng: &mut ChaCha8Rng) -> Candidate {
         let n = constraints.limits.0.len();
         let mut coefficients =
             || -> Vec<f64> { (0..settings.harmonics).map(|_| StandardNormal.sample(rng)).collect() };
@@ -364,7 +370,7 @@ impl Candidate {
         next
     }
 
-    fn path(&self, settings: &Settings, limits: &Limits) -> Fourier {
+    fn path(&self, settings: &ExcitationSettings, limits: &Limits) -> Fourier {
         let mut path = Fourier {
             fundamental: settings.fundamental,
             periods: settings.periods,
@@ -388,7 +394,7 @@ mod tests {
     #[test]
     fn the_search_improves_keeps_the_limits_and_repeats_itself() {
         let model = Model::derive(lwa4p()).unwrap();
-        let settings = Settings { evaluations: 400, seed: 3, ..Settings::default() };
+        let settings = ExcitationSettings { evaluations: 400, seed: 3, ..ExcitationSettings::default() };
         let found = optimise(&model, SetKind::Minimal, &settings).unwrap();
         assert_eq!(found, optimise(&model, SetKind::Minimal, &settings).unwrap());
         assert!(
@@ -410,7 +416,8 @@ mod tests {
         arm.joints[2].velocity = None;
         arm.joints[4].position = None;
         let model = Model::derive(arm).unwrap();
-        let refusal = optimise(&model, SetKind::Minimal, &Settings::default()).unwrap_err().to_string();
+        let refusal =
+            optimise(&model, SetKind::Minimal, &ExcitationSettings::default()).unwrap_err().to_string();
         assert!(
             refusal.contains("joint 3: `velocity`") && refusal.contains("joint 5: `position`"),
             "{refusal}"

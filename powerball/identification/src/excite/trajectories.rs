@@ -3,8 +3,8 @@
 
 use super::acceleration;
 use super::{
-    CLEARANCE, Conditions, Constraints, Error, Excitation, FloorAt, Limits, Load, Masses, Mounting,
-    Objective, RADIUS, Settings, Shape, Task, Tightest, optimise_all, surroundings,
+    CLEARANCE, Conditions, Constraints, Error, Excitation, ExcitationSettings, FloorAt, Limits, Load, Masses,
+    Mounting, Objective, RADIUS, Shape, Task, Tightest, optimise_all, surroundings,
 };
 use dyngen::{Arm, Model, SetKind};
 use powerball_controller::JointNumber;
@@ -20,7 +20,7 @@ pub struct ExciteOptions<'a> {
     /// The parameter set whose regressor is to be well conditioned.
     pub parameters: SetKind,
     /// The paths and their search.
-    pub search: Settings,
+    pub search: ExcitationSettings,
     /// Samples a second.
     pub rate: f64,
     /// The mountings of the base: a trajectory for each. If empty, the mounting of the arm file.
@@ -71,7 +71,7 @@ impl Default for ExciteOptions<'_> {
     fn default() -> Self {
         ExciteOptions {
             parameters: SetKind::Minimal,
-            search: Settings::default(),
+            search: ExcitationSettings::default(),
             rate: 200.0,
             mountings: Vec::new(),
             collision: Some(Collision::default()),

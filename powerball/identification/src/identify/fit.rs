@@ -1,6 +1,6 @@
 //! The fit by the estimator that is asked for.
 //!
-//! Also here: a model along logs, for people to look at.
+//! The file also has a model along logs, for people to look at.
 
 use super::gather::Gathered;
 use super::judge::by_band;

@@ -1,6 +1,6 @@
 //! Logs and summaries, taken in one after another: the sufficient statistics of each mounting of the base.
 //!
-//! Also here: arm and logs of one mounting, read at once; the samples of all logs of a computation, read at
+//! The file also has arm and logs of one mounting, read at once; the samples of all logs of a computation, read at
 //! once.
 
 use super::result::IdentifyError;

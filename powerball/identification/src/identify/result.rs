@@ -1,6 +1,6 @@
 //! What an identification gives, and the words for it.
 //!
-//! Also here: why logs come to no model.
+//! The file also has why logs come to no model.
 
 use super::fit::Along;
 use super::judge::MountedFit;

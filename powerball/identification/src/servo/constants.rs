@@ -141,7 +141,7 @@ impl Constants {
         self.0[constant as usize] = value;
     }
 
-    /// These, with one set.
+    /// Sets one of the constants.
     #[must_use]
     pub fn with(mut self, constant: Constant, value: f64) -> Constants {
         self.set(constant, value);

@@ -205,6 +205,37 @@ pub(super) fn group(names: &[String], key: &str, asked: Asked<'_>) -> Result<Gro
     Ok(Group { at: found.into_iter().flatten().collect(), factor })
 }
 
+/// The columns of a log's torques, currents or goals; else the quantity that is missing and what to do.
+fn effort(names: &[String], asked: Asked<'_>) -> Result<(Effort, Group), (&'static str, String)> {
+    let n = asked.arm.dof();
+    let goals = group(names, "goal", asked);
+    if asked.goals {
+        return match goals {
+            Ok(goal) => Ok((Effort::Goal, goal)),
+            Err(missing) => Err(("goal", missing_goals(&missing, n))),
+        };
+    }
+    let torques = match group(names, "tau", asked) {
+        Ok(torque) => return Ok((Effort::Torque, torque)),
+        Err(missing) => missing,
+    };
+    let currents = match group(names, "i", asked) {
+        Ok(current) => {
+            let constants = constants(asked.arm).map_err(|reason| ("i", reason))?;
+            return Ok((Effort::Current(constants), current));
+        }
+        Err(missing) => missing,
+    };
+    let missing = if torques.len() <= currents.len() { torques } else { currents };
+    let hint = if names.iter().any(|name| by_lerobot(name)) { TORQUE_OF_LEROBOT } else { "" };
+    let message = format!(
+        "a log needs tau1 … tau{n} [N·m] or i1 … i{n} [A] for each of the {n} joints; missing: {}{hint}{}",
+        missing.join(", "),
+        if goals.is_ok() { GOALS_ALONE } else { "" }
+    );
+    Err(("tau", message))
+}
+
 /// Where a log's quantities stand among its columns.
 pub(super) struct Columns {
     t: Group,
@@ -215,7 +246,7 @@ pub(super) struct Columns {
     /// dq, used for checks alone.
     dq: Option<Group>,
     pub(super) motor: Option<Group>,
-    /// Those of [`OF_SERVOS`], where they are read.
+    /// Columns of [`OF_SERVOS`], where they are read.
     pub(super) of_servos: Vec<Option<Group>>,
 }
 
@@ -262,46 +293,22 @@ impl Columns {
             Ok(_) => {}
             Err(missing) => errors.push(finding("q", missing_positions(names, missing, asked))),
         }
-        let (mut effort, mut torque) = (Effort::Torque, None);
-        match (group(names, "tau", asked), group(names, "i", asked)) {
-            _ if asked.goals => {
-                effort = Effort::Goal;
-                match group(names, "goal", asked) {
-                    Ok(goal) => torque = Some(goal),
-                    Err(missing) => errors.push(finding("goal", missing_goals(&missing, n))),
-                }
-            }
-            (Ok(tau), _) => torque = Some(tau),
-            (Err(_), Ok(current)) => match constants(asked.arm) {
-                Ok(constants) => {
-                    effort = Effort::Current(constants);
-                    torque = Some(current);
-                }
-                Err(reason) => errors.push(finding("i", reason)),
-            },
+        let effort = match effort(names, asked) {
+            Ok(effort) => Some(effort),
             // Where the joints' names are not the arm's, that was reported.
-            (Err(_), Err(_)) if q.is_err() && !logged_joints(names, asked.map).is_empty() => {}
-            (Err(tau), Err(current)) => {
-                let missing = if tau.len() <= current.len() { tau } else { current };
-                let hint = if names.iter().any(|name| by_lerobot(name)) { TORQUE_OF_LEROBOT } else { "" };
-                errors.push(finding(
-                    "tau",
-                    format!(
-                        "a log needs tau1 … tau{n} [N·m] or i1 … i{n} [A] for each of \
-                the {n} joints; missing: {}{hint}{}",
-                        missing.join(", "),
-                        if group(names, "goal", asked).is_ok() { GOALS_ALONE } else { "" }
-                    ),
-                ));
+            Err(("tau", _)) if q.is_err() && !logged_joints(names, asked.map).is_empty() => None,
+            Err((quantity, message)) => {
+                errors.push(finding(quantity, message));
+                None
             }
-        }
+        };
         if let (Headers::Unclear(text), false) = (headers, errors.is_empty()) {
             errors.push(finding(
                 "columns",
                 format!("by their names they may be {text}: take of these what is right"),
             ));
         }
-        let (Some(t), Ok(q), Some(torque), []) = (t, q, torque, errors.as_slice()) else {
+        let (Some(t), Ok(q), Some((effort, torque)), []) = (t, q, effort, errors.as_slice()) else {
             return Err(LogError(errors));
         };
         let optional = |key: &str| group(names, key, asked).ok();
@@ -315,22 +322,29 @@ impl Columns {
             motor: optional("motor").filter(|_| !asked.goals),
             of_servos: OF_SERVOS.map(|key| optional(key).filter(|_| asked.goals)).into(),
         };
-        if let Some(motor) = &columns.motor {
-            let shown: Vec<&str> = motor.at.iter().map(|k| names[*k].as_str()).collect();
+        let unused = columns.unused(names);
+        findings.extend(unused.into_iter().map(|(quantity, message)| finding(quantity, message)));
+        Ok(columns)
+    }
+
+    /// Columns that are no part of the arm's fit, each as a quantity and a message.
+    fn unused(&self, names: &[String]) -> Vec<(&'static str, String)> {
+        let shown = |at: &[usize]| at.iter().map(|k| names[*k].as_str()).collect::<Vec<_>>().join(", ");
+        let mut unused = Vec::new();
+        if let Some(motor) = &self.motor {
             let message = format!(
                 "kept in addition to the torques, for the transmission of each joint, and no part of the \
                  arm's fit: {}",
-                shown.join(", ")
+                shown(&motor.at)
             );
-            findings.push(finding("motor", message));
+            unused.push(("motor", message));
         }
-        let used: Vec<usize> = columns.groups().flat_map(|group| group.at.iter().copied()).collect();
-        let out: Vec<&str> =
-            (0..names.len()).filter(|k| !used.contains(k)).map(|k| names[k].as_str()).collect();
+        let used: Vec<usize> = self.groups().flat_map(|group| group.at.iter().copied()).collect();
+        let out: Vec<usize> = (0..names.len()).filter(|k| !used.contains(k)).collect();
         if !out.is_empty() {
-            findings.push(finding("columns", format!("kept out: {}", out.join(", "))));
+            unused.push(("columns", format!("kept out: {}", shown(&out))));
         }
-        Ok(columns)
+        unused
     }
 
     fn groups(&self) -> impl Iterator<Item = &Group> {

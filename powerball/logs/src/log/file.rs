@@ -5,7 +5,7 @@
 //! not at all. Where a program died before that, the lines are still there, a log like any other; the next
 //! log of that name puts them into a Parquet file of their own first. So it is with MCAP.
 //!
-//! Also here: logs as files.
+//! The file also has logs as files.
 
 use super::Log;
 use crate::tables::NOT_WRITTEN;

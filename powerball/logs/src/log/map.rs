@@ -1,9 +1,5 @@
 //! Which columns of a file are which quantities, in which unit and with which sign.
-//!
-//! Also here: one running time through several logs.
 
-use super::Log;
-use crate::signal::resample::linear_at;
 use serde::Deserialize;
 use std::path::Path;
 
@@ -335,101 +331,6 @@ impl Mapped {
 
 fn factor(key: &str, unit: &str) -> Option<f64> {
     units(key).iter().find(|(names, _)| names.contains(&unit)).map(|(_, factor)| *factor)
-}
-
-// One running time through several logs: what warms up knows no files.
-//
-// Also here: torques whose time stamps are known to be off.
-
-/// Sets [`Log::clock`] so that `t + clock` runs through all logs.
-///
-/// Where the spans of `t` do not overlap, `t` is a common clock already. Otherwise the logs were recorded in
-/// the given order, one right after the other.
-pub fn common_clock(logs: &mut [Log]) {
-    let clocks = clocks(logs.iter().map(|log| log.t.as_slice()));
-    logs.iter_mut().zip(clocks).for_each(|(log, clock)| log.clock = clock);
-}
-
-/// What is added to the times of each log, s.
-pub(super) fn clocks<'t>(times: impl Iterator<Item = &'t [f64]>) -> Vec<f64> {
-    let span = |t: &[f64]| (t.first().copied().unwrap_or(0.0), t.last().copied().unwrap_or(0.0));
-    let spans: Vec<(f64, f64)> = times.map(span).collect();
-    let mut sorted = spans.clone();
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let start = sorted.first().map_or(0.0, |s| s.0);
-    if sorted.windows(2).all(|pair| pair[0].1 <= pair[1].0) {
-        return vec![-start; spans.len()];
-    }
-    let mut end = 0.0;
-    let after = |(first, last): (f64, f64)| {
-        let clock = end - first;
-        end += last - first;
-        clock
-    };
-    spans.into_iter().map(after).collect()
-}
-
-// Torques whose time stamps are known to be off.
-
-impl Log {
-    /// The log with torques whose stamps are moved as a map says. What lies within the longest shift of an
-    /// end of a piece is left out there: its torque is not known any more.
-    #[must_use]
-    pub(super) fn shifted(mut self, map: &Mapped) -> Log {
-        let shifts: Vec<f64> = (0..self.torque.len()).map(|j| map.shift_of(j)).collect();
-        let longest = shifts.iter().fold(0.0f64, |most, s| most.max(s.abs()));
-        if longest == 0.0 {
-            return self;
-        }
-        for (torque, shift) in self.torque.iter_mut().zip(&shifts) {
-            let logged = torque.clone();
-            for piece in &self.pieces {
-                let (t, x) = (&self.t[piece.clone()], &logged[piece.clone()]);
-                for (k, to) in piece.clone().zip(t) {
-                    torque[k] = linear_at(t, x, to - shift);
-                }
-            }
-        }
-        for piece in &mut self.pieces {
-            let t = &self.t[piece.clone()];
-            let (from, to) = (t[0] + longest, t[t.len() - 1] - longest);
-            let start = piece.start;
-            *piece = start + t.partition_point(|t| *t < from)..start + t.partition_point(|t| *t <= to);
-        }
-        self.pieces.retain(|piece| piece.len() >= 2);
-        self
-    }
-}
-
-#[cfg(test)]
-mod shift_tests {
-    use super::super::map::ColumnMap;
-    use super::*;
-
-    #[test]
-    fn a_shift_moves_torques_and_nothing_else() {
-        let t: Vec<f64> = (0..1000).map(|k| 0.01 * f64::from(k)).collect();
-        let wave = |late: f64| -> Vec<f64> { t.iter().map(|t| (2.0 * (t - late)).sin()).collect() };
-        let log = Log {
-            file: "log.csv".into(),
-            q: vec![wave(0.0); 2],
-            torque: vec![wave(0.08), wave(0.0)],
-            temperature: None,
-            motor: None,
-            pieces: vec![0..400, 400..1000],
-            doubts: Vec::new(),
-            clock: 0.0,
-            t: t.clone(),
-        };
-        let map = ColumnMap::parse("tau.shift = [-0.08, 0]", "--map").unwrap();
-        let shifted = log.clone().shifted(&map.tau);
-        assert_eq!((shifted.pieces.clone(), &shifted.q), (vec![8..392, 408..992], &log.q));
-        for k in shifted.pieces.into_iter().flatten() {
-            approx::assert_abs_diff_eq!(shifted.torque[0][k], log.torque[1][k], epsilon = 1e-4);
-            approx::assert_abs_diff_eq!(shifted.torque[1][k], log.torque[1][k], epsilon = 1e-12);
-        }
-        assert!(ColumnMap::parse("q.shift = 0.1", "--map").unwrap_err().contains("only `tau` and `i`"));
-    }
 }
 
 #[cfg(test)]

@@ -17,6 +17,7 @@ mod outliers;
 mod read;
 mod servo;
 mod signal_checks;
+mod times;
 mod topics;
 
 pub use crate::tables::{Finding, LogError};
@@ -24,11 +25,12 @@ pub use arrays::{Arrays, Sample};
 pub use file::LogFile;
 pub use inspect::{Aligned, Inspected, InspectedColumn, InspectedTable, TakenAs, inspect};
 pub use live::{LiveRows, LiveSample, Taken};
-pub use map::{ByJoint, Clock, ColumnMap, Mapped, common_clock};
+pub use map::{ByJoint, Clock, ColumnMap, Mapped};
 pub use motors::{Motors, logs_of_motors, notes_of};
 pub use read::{read_log, read_log_as, read_logs, read_logs_as};
 pub use servo::{ServoLog, is_of_servos};
 use signal_checks::{Severity, Warnings};
+pub use times::common_clock;
 pub use topics::{Alignment, alignment};
 
 /// One recording as it was logged, after its faults were taken out.

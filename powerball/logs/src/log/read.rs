@@ -1,6 +1,6 @@
 //! Logs found by their column names, from a file of any format.
 //!
-//! Also here: samples as they were read, before any doubt; the samples of a log while it is read, by whatever
+//! The file also has samples as they were read, before any doubt; the samples of a log while it is read, by whatever
 //! reader.
 
 use super::columns::{Asked, Columns};

@@ -2,8 +2,9 @@
 
 use super::columns::{Asked, constants, group};
 use super::headers::{self, Headers};
-use super::map::{ColumnMap, clocks};
+use super::map::ColumnMap;
 use super::read::{Samples, read_asked};
+use super::times::clocks;
 use super::{Doubt, Finding, LogError};
 use crate::tables::{Format, Place, RowSink, columnar, is_address, read_dataset, text};
 use dyngen::Arm;

@@ -3,33 +3,69 @@
 
 use dyngen::Arm;
 use dyngen::arm::{Convention, JointKind};
+use dyngen::exact::rational::to_f64;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// The regressor of all eleven parameters of every link, then of every bar (n × p, row-major) at one state,
 /// for gravity `g` in the base frame.
 pub fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec<f64> {
     let n = arm.dof();
-    let motors = arm.motor_velocity_matrix_f64();
-    let rate = |motor: usize, of: &[f64]| -> f64 { motors[motor].iter().zip(of).map(|(m, x)| m * x).sum() };
-    let number = dyngen::exact::rational::to_f64;
     let width = 11 * arm.bodies();
     let mut y = vec![0.0; n * width];
-    let (mut axes, mut points) = (Vec::new(), Vec::new());
-    let (mut r, mut p) = (Matrix3::identity(), Vector3::zeros());
-    let (mut w, mut dw, mut acc) = (Vector3::zeros(), Vector3::zeros(), -Vector3::from(g));
-    let mut frames = vec![Moving { r, p, w, dw, acc }];
-    for (i, joint) in arm.joints.iter().enumerate() {
+    let mut links = vec![Link::base(g)];
+    for i in 0..n {
+        let next = links[i].next(arm, i, [q[i], v[i], a[i]]);
+        rotor(arm, i, [v, a], &links, next.axis, |j, torque| y[j * width + 11 * i + 10] += torque);
+        links.push(next);
+        body(arm, &links, i + 1, i + 1, Vector3::zeros(), |j, c, torque| y[j * width + 11 * i + c] = torque);
+    }
+    for (k, bar) in arm.bars.iter().enumerate() {
+        let after = |link: Option<usize>| link.map_or(0, |link| link + 1);
+        let pin = Vector3::from(bar.pin.each_ref().map(to_f64));
+        body(arm, &links, after(bar.carrier), after(bar.parallel), pin, |j, c, torque| {
+            y[j * width + 11 * (n + k) + c] = torque;
+        });
+    }
+    y
+}
+
+/// A link's frame in the base frame: axes, origin, angular velocity and acceleration, acceleration less
+/// gravity; and the axis of its joint with a point on it, which are fixed in the link before.
+#[derive(Clone, Copy)]
+struct Link {
+    r: Matrix3<f64>,
+    p: Vector3<f64>,
+    w: Vector3<f64>,
+    dw: Vector3<f64>,
+    acc: Vector3<f64>,
+    axis: Vector3<f64>,
+    point: Vector3<f64>,
+}
+
+impl Link {
+    fn base(g: [f64; 3]) -> Link {
+        let zero = Vector3::zeros();
+        Link {
+            r: Matrix3::identity(),
+            p: zero,
+            w: zero,
+            dw: zero,
+            acc: -Vector3::from(g),
+            axis: zero,
+            point: zero,
+        }
+    }
+
+    /// The link after joint `i`, from the joint's position, velocity and acceleration.
+    fn next(&self, arm: &Arm, i: usize, [q, v, a]: [f64; 3]) -> Link {
+        let Link { r, p, w, dw, .. } = *self;
+        let joint = &arm.joints[i];
         let prismatic = joint.kind == JointKind::Prismatic;
-        let (theta, d) = if prismatic {
-            (joint.theta.radians(), number(&joint.d) + q[i])
-        } else {
-            (joint.theta.radians() + q[i], number(&joint.d))
-        };
+        let (turned, moved) = if prismatic { (0.0, q) } else { (q, 0.0) };
         let twist = *Rotation3::from_axis_angle(&Vector3::x_axis(), joint.alpha.radians()).matrix();
-        let turn = *Rotation3::from_axis_angle(&Vector3::z_axis(), theta).matrix();
-        let shift = Vector3::new(number(&joint.a), number(&joint.b), 0.0);
-        let along = Vector3::new(0.0, 0.0, d);
-        // The joint's axis and a point on it are fixed in link i − 1.
+        let turn = *Rotation3::from_axis_angle(&Vector3::z_axis(), joint.theta.radians() + turned).matrix();
+        let shift = Vector3::new(to_f64(&joint.a), to_f64(&joint.b), 0.0);
+        let along = Vector3::new(0.0, 0.0, to_f64(&joint.d) + moved);
         let (axis, point, r_next, p_next) = match arm.convention {
             Convention::Standard => {
                 let next = r * turn * twist;
@@ -41,86 +77,75 @@ pub fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec
                 (frame * Vector3::z(), point, frame * turn, point + frame * along)
             }
         };
-        if let Some(ratio) = &joint.rotor_ratio {
-            let (k, column) = (number(ratio), 11 * i + 10);
-            let (velocity, change) = (rate(i, v), rate(i, a));
-            for (j, factor) in motors[i].iter().enumerate() {
-                y[j * width + column] += factor * (k * k * change + k * axis.dot(&dw));
-            }
-            let moment = axis * (k * change) + w.cross(&axis) * (k * velocity);
-            for j in 0..i {
-                if arm.joints[j].kind == JointKind::Revolute {
-                    let z: Vector3<f64> = axes[j];
-                    y[j * width + column] += z.dot(&moment);
-                }
-            }
-        }
-        axes.push(axis);
-        points.push(point);
-        let arm_vector = p_next - p;
-        let (w0, dw0) = (w, dw);
-        if prismatic {
-            acc += dw0.cross(&arm_vector)
-                + w0.cross(&w0.cross(&arm_vector))
-                + axis * a[i]
-                + w0.cross(&axis) * (2.0 * v[i]);
+        let (w_next, dw_next, slide) = if prismatic {
+            (w, dw, axis * a + w.cross(&axis) * (2.0 * v))
         } else {
-            w = w0 + axis * v[i];
-            dw = dw0 + axis * a[i] + w0.cross(&axis) * v[i];
-            // To the axis with link i − 1, from there with link i.
-            let (to_axis, from_axis) = (point - p, p_next - point);
-            acc += dw0.cross(&to_axis)
-                + w0.cross(&w0.cross(&to_axis))
-                + dw.cross(&from_axis)
-                + w.cross(&w.cross(&from_axis));
-        }
-        (r, p) = (r_next, p_next);
-        frames.push(Moving { r, p, w, dw, acc });
-
-        let local = r.transpose();
-        let columns = link_columns(local * w, local * dw, local * acc);
-        for j in 0..=i {
-            let z = local * axes[j];
-            let lever = local * (p - points[j]);
-            for (k, (force, moment)) in columns.iter().enumerate() {
-                y[j * width + 11 * i + k] = match arm.joints[j].kind {
-                    JointKind::Revolute => z.dot(&(moment + lever.cross(force))),
-                    JointKind::Prismatic => z.dot(force),
-                };
-            }
-        }
+            (w + axis * v, dw + axis * a + w.cross(&axis) * v, Vector3::zeros())
+        };
+        // To the joint's axis with the link before, from there with this one; a prismatic joint does not turn,
+        // so both parts move alike.
+        let (to_axis, from_axis) = (point - p, p_next - point);
+        let acc = self.acc
+            + dw.cross(&to_axis)
+            + w.cross(&w.cross(&to_axis))
+            + dw_next.cross(&from_axis)
+            + w_next.cross(&w_next.cross(&from_axis))
+            + slide;
+        Link { r: r_next, p: p_next, w: w_next, dw: dw_next, acc, axis, point }
     }
-    for (k, bar) in arm.bars.iter().enumerate() {
-        let of =
-            |link: Option<usize>| (link.map_or(0, |link| link + 1), frames[link.map_or(0, |link| link + 1)]);
-        let ((carriers, carrier), (turning, parallel)) = (of(bar.carrier), of(bar.parallel));
-        let reach = carrier.r * Vector3::from(bar.pin.each_ref().map(number));
-        let acc = carrier.acc + carrier.dw.cross(&reach) + carrier.w.cross(&carrier.w.cross(&reach));
-        let local = parallel.r.transpose();
-        let columns = link_columns(local * parallel.w, local * parallel.dw, local * acc);
-        for j in 0..carriers.max(turning) {
-            let (z, lever) = (local * axes[j], local * (carrier.p + reach - points[j]));
-            for (c, (force, moment)) in columns.iter().enumerate() {
-                let (force, moment) = (felt_part(j < carriers, force), felt_part(j < turning, moment));
-                y[j * width + 11 * (n + k) + c] = match arm.joints[j].kind {
-                    JointKind::Revolute => z.dot(&(moment + lever.cross(&force))),
-                    JointKind::Prismatic => z.dot(&force),
-                };
-            }
-        }
-    }
-    y
 }
 
-/// A link's frame in the base frame: axes, origin, angular velocity and acceleration, acceleration less
-/// gravity.
-#[derive(Clone, Copy)]
-struct Moving {
-    r: Matrix3<f64>,
-    p: Vector3<f64>,
-    w: Vector3<f64>,
-    dw: Vector3<f64>,
-    acc: Vector3<f64>,
+/// The torque of each joint for unit inertia of rotor `i`, which sits on link i − 1: Eq. 5.
+fn rotor(
+    arm: &Arm,
+    i: usize,
+    [v, a]: [&[f64]; 2],
+    links: &[Link],
+    axis: Vector3<f64>,
+    mut add: impl FnMut(usize, f64),
+) {
+    let Some(ratio) = &arm.joints[i].rotor_ratio else { return };
+    let k = to_f64(ratio);
+    let motors = arm.motor_velocity_matrix_f64();
+    let rate = |of: &[f64]| -> f64 { motors[i].iter().zip(of).map(|(m, x)| m * x).sum() };
+    let (velocity, change) = (rate(v), rate(a));
+    let Link { w, dw, .. } = links[i];
+    for (j, factor) in motors[i].iter().enumerate() {
+        add(j, factor * (k * k * change + k * axis.dot(&dw)));
+    }
+    let moment = axis * (k * change) + w.cross(&axis) * (k * velocity);
+    for j in (0..i).filter(|j| arm.joints[*j].kind == JointKind::Revolute) {
+        add(j, links[j + 1].axis.dot(&moment));
+    }
+}
+
+/// The torque of each joint for each unit parameter of a body that turns with one link, and whose origin is
+/// `pin` in the frame of another (the same one, and its origin, for a link). Both count from the base, 0.
+fn body(
+    arm: &Arm,
+    links: &[Link],
+    carrier: usize,
+    turning: usize,
+    pin: Vector3<f64>,
+    mut set: impl FnMut(usize, usize, f64),
+) {
+    let (at, with) = (links[carrier], links[turning]);
+    let reach = at.r * pin;
+    let acc = at.acc + at.dw.cross(&reach) + at.w.cross(&at.w.cross(&reach));
+    let local = with.r.transpose();
+    let columns = link_columns(local * with.w, local * with.dw, local * acc);
+    for j in 0..carrier.max(turning) {
+        let Link { axis, point, .. } = links[j + 1];
+        let (z, lever) = (local * axis, local * (at.p + reach - point));
+        for (c, (force, moment)) in columns.iter().enumerate() {
+            let (force, moment) = (felt_part(j < carrier, force), felt_part(j < turning, moment));
+            let torque = match arm.joints[j].kind {
+                JointKind::Revolute => z.dot(&(moment + lever.cross(&force))),
+                JointKind::Prismatic => z.dot(&force),
+            };
+            set(j, c, torque);
+        }
+    }
 }
 
 /// A joint feels the force of a bar where it moves the pin, and its moment where it turns the bar.

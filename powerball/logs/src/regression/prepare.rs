@@ -193,7 +193,7 @@ impl<'a> Data<'a> {
         Ok(bands.into_iter().zip(joints).map(of_band).collect())
     }
 
-    /// These rows with other signals: samples, band and blocks are not changed.
+    /// Rows with other signals: samples, band and blocks are not changed.
     #[must_use]
     pub fn seen_otherwise(&self, correct: impl FnMut(&mut Recording)) -> Data<'a> {
         let mut recordings = self.recordings.to_vec();
@@ -202,7 +202,7 @@ impl<'a> Data<'a> {
         self.with(Arc::new(recordings), joints)
     }
 
-    /// These rows without a known torque, by joint and row, N·m.
+    /// Rows without a known torque, by joint and row, N·m.
     #[must_use]
     pub fn without_torque(&self, torque: &[Vec<f64>]) -> Data<'a> {
         let mut joints = self.joints.clone();
@@ -212,7 +212,7 @@ impl<'a> Data<'a> {
         Data { per_joint: self.per_joint, ..self.with(Arc::clone(&self.recordings), joints) }
     }
 
-    /// These rows, recorded at other times: the common clock at the first sample of each recording, s.
+    /// Rows that were recorded at other times: the common clock at the first sample of each recording, s.
     #[must_use]
     pub fn with_clocks(&self, clocks: &[f64]) -> Data<'a> {
         let mut recordings = self.recordings.to_vec();
@@ -220,7 +220,7 @@ impl<'a> Data<'a> {
         Data { per_joint: self.per_joint, ..self.with(Arc::new(recordings), self.joints.clone()) }
     }
 
-    /// These rows with the columns of another arm: `count` parameters, and their columns along a recording,
+    /// Rows with the columns of another arm: `count` parameters, and their columns along a recording,
     /// samples × n × parameters.
     #[must_use]
     pub fn of_other_columns(&self, count: usize, columns: impl Fn(&Recording) -> Vec<f64>) -> Data<'a> {
@@ -291,7 +291,7 @@ impl<'a> Data<'a> {
         joints
     }
 
-    /// These logs with some joints in narrower bands: `narrower` are the bands after this one, each made of
+    /// Logs with some joints in narrower bands: `narrower` are the bands after this one, each made of
     /// the one before, and `which` says by joint which of them, 0 for this one.
     #[must_use]
     pub fn with_narrower(mut self, narrower: &[Data<'_>], which: &[usize], block: f64) -> Data<'a> {

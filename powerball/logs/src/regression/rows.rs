@@ -184,7 +184,7 @@ pub(super) fn saturation_notes(logs: &[Log], joint: usize, spans: &[Vec<[f64; 2]
 // its position: all that the path alone can explain counts as explained, and only the rest is examined.
 
 impl Data<'_> {
-    /// These logs with columns of its own for every joint: the minimal set, an offset and its position.
+    /// Logs with columns of its own for every joint: the minimal set, an offset and its position.
     #[must_use]
     pub fn per_joint_fit(mut self) -> Self {
         let joints: Vec<usize> = (0..self.dof()).collect();
@@ -203,7 +203,7 @@ impl Data<'_> {
         self
     }
 
-    /// These logs with the columns of one minimal set for all joints.
+    /// Logs with the columns of one minimal set for all joints.
     #[must_use]
     pub fn joint_fit(&self) -> Self {
         let mut joints = self.joints.clone();

@@ -104,7 +104,7 @@ impl Summary {
         Columns { inertial: self.identity.parameters.len() }
     }
 
-    /// These rows in the columns of the minimal set of `general`, which is the same arm under a gravity
+    /// Rows in the columns of the minimal set of `general`, which is the same arm under a gravity
     /// whose parameters determine those of `own`, in whose columns the rows are; `None` if they do not.
     #[must_use]
     pub fn in_set(&self, own: &RigidArm, general: &RigidArm) -> Option<Summary> {

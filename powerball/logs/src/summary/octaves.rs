@@ -110,7 +110,7 @@ impl Octaves {
         self.levels.iter_mut().for_each(|level| level.round(&steps));
     }
 
-    /// These rows with combinations of their columns, like [`RFactor::combined`].
+    /// Rows with combinations of their columns, like [`RFactor::combined`].
     #[must_use]
     pub fn combined(&self, columns: &[Vec<(usize, f64)>]) -> Octaves {
         Octaves { levels: self.levels.iter().map(|level| level.combined(columns)).collect() }

@@ -53,6 +53,30 @@ fn profile(out: &mut String, drive: &Dcf, arm: &Arm, constant: &str) -> Result<(
     line(format!("    master_watch_ms: {},", arm.watch.master_watch_ms));
     line(format!("    sync_timeout_factor: {:?},", arm.watch.sync_timeout_factor));
     line(format!("    node_heartbeat_ms: {},", arm.watch.node_heartbeat_ms));
+    let modes = modes(drive, arm)?;
+    for (name, _) in MODES {
+        let source = modes.iter().find(|(mode, _)| *mode == name);
+        let source = source.map_or("None".to_string(), |(_, source)| format!("Some({source})"));
+        line(format!("    {name}: {source},"));
+    }
+    line(velocity_scale(arm, modes.iter().any(|(mode, _)| *mode == "velocity"))?);
+    line("    tpdos: [".into());
+    for source in transmit_pdos(drive, arm)? {
+        line(format!("        {source},"));
+    }
+    line("    ],".into());
+    line("    joints: [".into());
+    for source in joints(drive, arm)? {
+        line(format!("        {source},"));
+    }
+    line("    ],".into());
+    line("    reactions: Reactions::DEFAULT,".into());
+    line("};\n".into());
+    Ok(())
+}
+
+/// The modes of the arm's file that the drive has, each with its source.
+fn modes(drive: &Dcf, arm: &Arm) -> Result<Vec<(&'static str, String)>, ImportError> {
     let known = MODES.map(|(name, _)| name);
     if let Some(unknown) = arm.mode.keys().find(|name| !known.contains(&name.as_str())) {
         return wrong(format!(
@@ -73,55 +97,56 @@ fn profile(out: &mut String, drive: &Dcf, arm: &Arm, constant: &str) -> Result<(
             (Err(why), None) => return Err(why),
         }
     }
-    let has = |name: &str| modes.iter().any(|(mode, _)| *mode == name);
     if modes.is_empty() {
         return wrong(format!(
             "the file gives no mode that the drive has; the driver knows {}",
             known.join(", ")
         ));
     }
-    for name in known {
-        let source = modes.iter().find(|(mode, _)| *mode == name);
-        let source = source.map_or("None".to_string(), |(_, source)| format!("Some({source})"));
-        line(format!("    {name}: {source},"));
-    }
+    Ok(modes)
+}
+
+/// The unit of the drive's velocities, which only the velocity mode needs.
+fn velocity_scale(arm: &Arm, needed: bool) -> Result<String, ImportError> {
     let (numerator, denominator, millidegrees, verified) = match &arm.velocity_scale {
         Some(scale) => {
             (scale.numerator, scale.denominator, scale.millidegrees_per_second, scale.verified_on_hardware)
         }
-        None if has("velocity") => return wrong("[mode.velocity] needs [velocity_scale]".into()),
+        None if needed => return wrong("[mode.velocity] needs [velocity_scale]".into()),
         None => (1, 1, 1.0, false),
     };
-    line(format!(
+    Ok(format!(
         "    velocity_scale: VelocityScale {{\n        numerator: {numerator},\n        \
          denominator: {denominator},\n        millidegrees: {millidegrees:?},\n        \
          verified_on_hardware: {verified},\n    }},"
-    ));
-    line("    tpdos: [".into());
+    ))
+}
+
+/// The mappings of transmit PDOs 1 to 4.
+fn transmit_pdos(drive: &Dcf, arm: &Arm) -> Result<Vec<String>, ImportError> {
     if let Some(unknown) = arm.transmit.keys().find(|key| !["1", "2", "3", "4"].contains(&key.as_str())) {
         return wrong(format!("[transmit] {unknown}: PDOs are numbered 1 … 4"));
     }
-    for number in 1..=4 {
+    let source = |number: usize| {
         let mapped = arm.transmit.get(&number.to_string()).map_or(&[][..], Vec::as_slice);
-        let (source, _) = mapped_source(drive, mapped, &format!("transmit PDO {number}"), 8)?;
-        line(format!("        {source},"));
-    }
-    line("    ],".into());
-    line("    joints: [".into());
-    let mut said: Vec<String> = Vec::new();
+        mapped_source(drive, mapped, &format!("transmit PDO {number}"), 8).map(|(source, _)| source)
+    };
+    (1..=4).map(source).collect()
+}
+
+/// The joints' entries; drives of one kind have one scale, which is reported once.
+fn joints(drive: &Dcf, arm: &Arm) -> Result<Vec<String>, ImportError> {
+    let mut reported: Vec<String> = Vec::new();
+    let mut sources = Vec::new();
     for joint in &arm.joint {
         let (counts, note) = scale::counts_per_degree(drive, joint)?;
-        // Drives of one kind have one scale: it is reported once.
-        if let Some(note) = note.filter(|note| !said.contains(note)) {
+        if let Some(note) = note.filter(|note| !reported.contains(note)) {
             say(&note);
-            said.push(note);
+            reported.push(note);
         }
-        line(format!("        {},", joint_source(drive, joint, counts)));
+        sources.push(joint_source(drive, joint, counts));
     }
-    line("    ],".into());
-    line("    reactions: Reactions::DEFAULT,".into());
-    line("};\n".into());
-    Ok(())
+    Ok(sources)
 }
 
 fn object(object: Object) -> String {

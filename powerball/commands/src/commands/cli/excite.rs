@@ -7,8 +7,8 @@ use dyngen::{Arm, SetKind};
 use powerball_controller::JointNumber;
 pub(super) use powerball_identification::excite::{CLEARANCE, FloorAt, RADIUS};
 use powerball_identification::excite::{
-    Collision, Criterion, Error, ExciteOptions, Excited, MassSource, Mounting, SEARCH, Settings, excite,
-    searches,
+    Collision, Criterion, Error, ExcitationSettings, ExciteOptions, Excited, MassSource, Mounting, SEARCH,
+    excite, searches,
 };
 use powerball_logs::Progress;
 use serde_json::{Value, json};
@@ -186,8 +186,8 @@ impl Excite {
         Ok(())
     }
 
-    fn search(&self) -> Settings {
-        Settings {
+    fn search(&self) -> ExcitationSettings {
+        ExcitationSettings {
             harmonics: self.harmonics,
             fundamental: std::f64::consts::TAU / self.period,
             periods: self.periods,

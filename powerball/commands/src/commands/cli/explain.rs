@@ -1,6 +1,6 @@
 //! `powerball explain`: the residual loop, from logs to explained.json and report.html.
 //!
-//! Also here: what `explain` prints.
+//! The file also has what `explain` prints.
 
 use super::Failure;
 use super::inputs::{Inputs, recorded, sources};

@@ -1,6 +1,6 @@
 //! `powerball identify`: from logs to identified.json.
 //!
-//! Also here: what was identified, in a copy of the robot description that the arm was imported from.
+//! The file also has what was identified, in a copy of the robot description that the arm was imported from.
 
 use super::inputs::{MapArgument, MountedLogs};
 use super::output::{Accept, Verbosity};

@@ -1,6 +1,6 @@
 //! What `explain` reads: an arm, logs, what is known already; and a folder for results.
 //!
-//! Also here: logs with the mounting of the base that each was recorded in.
+//! The file also has logs with the mounting of the base that each was recorded in.
 
 use super::Failure;
 use super::output::{self, Progress};
@@ -134,7 +134,7 @@ pub(crate) struct MountedLogs {
 }
 
 impl MountedLogs {
-    /// These logs, with the columns of all read by `map`.
+    /// Reads the columns of all logs by `map`.
     pub(crate) fn mapped(self, map: ColumnMap) -> MountedLogs {
         let map = Arc::new(map);
         let mapped = |of: Vec<Source<'static>>| of.into_iter().map(|s| s.mapped(Arc::clone(&map))).collect();

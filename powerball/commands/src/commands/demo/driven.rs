@@ -13,7 +13,7 @@ use powerball_controller::laws::ComputedTorque;
 use powerball_explanation::torque_model::{Additions, TorqueModel};
 use powerball_identification::Identified;
 use powerball_identification::estimate::{JointFriction, ParameterEstimate};
-use powerball_identification::excite::{self, Settings};
+use powerball_identification::excite::{self, ExcitationSettings};
 use powerball_virtual_arm::{VirtualArm, lwa4p};
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -132,13 +132,13 @@ fn path(
     let model = model.map_err(SessionError::Excitation)?;
     let mut why = String::new();
     for k in 0..PATHS {
-        let settings = Settings {
+        let settings = ExcitationSettings {
             harmonics: 5,
             fundamental: TAU / PERIOD,
             evaluations: EVALUATIONS,
             // Away from the seeds of the paths that were recorded.
             seed: (1 << 32) + seed.wrapping_mul(PATHS).wrapping_add(k),
-            ..Settings::default()
+            ..ExcitationSettings::default()
         };
         let found =
             excite::optimise(&model, SetKind::Minimal, &settings).map_err(SessionError::Excitation)?;

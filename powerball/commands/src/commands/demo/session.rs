@@ -8,7 +8,7 @@ use dyngen::{Model, SetKind};
 use powerball_bus::driver::lwa4p::LWA4P;
 use powerball_bus::driver::{Driver, Refusal};
 use powerball_bus::transport::{ArmError, Master, Memory};
-use powerball_identification::excite::{self, Settings};
+use powerball_identification::excite::{self, ExcitationSettings};
 use powerball_logs::motion::Motion;
 use powerball_virtual_arm::slave::Setup;
 use powerball_virtual_arm::{Plant, PlantEffect as Effect, Undeclared, VirtualArm, lwa4p};
@@ -131,13 +131,13 @@ impl Session {
         save(&arm_file, lwa4p::ARM_FILE)?;
         let model = Model::derive(lwa4p::arm()?).map_err(excite::Error::Model)?;
 
-        let settings: Vec<Settings> = (PATHS.iter().enumerate())
-            .map(|(k, (_, period))| Settings {
+        let settings: Vec<ExcitationSettings> = (PATHS.iter().enumerate())
+            .map(|(k, (_, period))| ExcitationSettings {
                 harmonics: 5,
                 fundamental: TAU / period,
                 evaluations: EVALUATIONS,
                 seed: seed.wrapping_mul(PATHS.len() as u64).wrapping_add(k as u64 + (attempt << 48)),
-                ..Settings::default()
+                ..ExcitationSettings::default()
             })
             .collect();
         let found = powerball_logs::parallel::map(&settings, |settings| {

@@ -68,36 +68,7 @@ impl Friction {
         let model = Model::derive(arm).map_err(|e| Failure::Refused(e.to_string()))?;
         std::fs::create_dir_all(&self.out)
             .map_err(|e| Failure::Unusable(format!("{}: cannot be made: {e}", self.out.display())))?;
-        let mut notes = Vec::new();
-        let mut experiments = Vec::new();
-        for joint in wanted.iter().map(|j| j - 1) {
-            let mounting = match self.place.bus {
-                BusUrl::Virtual => gravity_free::find(&model, joint).map(|found| found.mounting),
-                _ => Some(self.mounting),
-            };
-            let planned = match mounting {
-                Some(mounting) => plan(&model, joint, mounting, LWA4P.period_seconds()).map_err(failure)?,
-                None => None,
-            };
-            match planned {
-                Some(experiment) => experiments.push(experiment),
-                None => notes.push(match gravity_free::find(&model, joint) {
-                    Some(found) => format!(
-                        "joint {} needs the base mounted {} (--mounting {})",
-                        joint + 1,
-                        found.mounting,
-                        found.mounting.text()
-                    ),
-                    None => format!("joint {}: no pose in any mounting frees it from gravity", joint + 1),
-                }),
-            }
-        }
-        if experiments.is_empty() {
-            return Err(Failure::Refused(format!(
-                "nothing can be measured in this mounting: {}",
-                notes.join("; ")
-            )));
-        }
+        let (experiments, notes) = self.plan(&model, &wanted)?;
         self.record(&model, &experiments, &progress)?;
         let mut found = Vec::new();
         for experiment in &experiments {
@@ -115,22 +86,46 @@ impl Friction {
             "report.html",
             page(&model.arm().name, &found, &notes).to_html().as_bytes(),
         )?;
-        if self.place.json {
-            output::print(&text);
-            return Ok(());
-        }
-        notes.iter().for_each(|note| output::print(&format!("note: {note}")));
-        for joint in &found {
-            let chosen = &joint.laws[joint.chosen];
-            output::print(&format!(
-                "joint {}: {} fits best on velocities left out ({:.4} N·m); tanh friction (Eq. 16): {}",
-                joint.joint + 1,
-                chosen.fitted.law.name(),
-                chosen.held_out,
-                joint.laws[0].fitted.gamma().map_or(String::new(), |g| g.map(number).join(", "))
-            ));
+        match self.place.json {
+            true => output::print(&text),
+            false => print(&found, &notes),
         }
         Ok(())
+    }
+
+    /// The joints' experiments in their mountings, and a note on each joint that has none.
+    fn plan(&self, model: &Model, wanted: &[usize]) -> Result<(Vec<Experiment>, Vec<String>), Failure> {
+        let mut notes = Vec::new();
+        let mut experiments = Vec::new();
+        for joint in wanted.iter().map(|j| j - 1) {
+            let mounting = match self.place.bus {
+                BusUrl::Virtual => gravity_free::find(model, joint).map(|found| found.mounting),
+                _ => Some(self.mounting),
+            };
+            let planned = match mounting {
+                Some(mounting) => plan(model, joint, mounting, LWA4P.period_seconds()).map_err(failure)?,
+                None => None,
+            };
+            match planned {
+                Some(experiment) => experiments.push(experiment),
+                None => notes.push(match gravity_free::find(model, joint) {
+                    Some(found) => format!(
+                        "joint {} needs the base mounted {} (--mounting {})",
+                        joint + 1,
+                        found.mounting,
+                        found.mounting.text()
+                    ),
+                    None => format!("joint {}: no pose in any mounting frees it from gravity", joint + 1),
+                }),
+            }
+        }
+        if experiments.is_empty() {
+            return Err(Failure::Refused(format!(
+                "nothing can be measured in this mounting: {}",
+                notes.join("; ")
+            )));
+        }
+        Ok((experiments, notes))
     }
 
     /// Records what is not there yet, one mounting after the other.
@@ -203,6 +198,20 @@ fn failure(e: FrictionError) -> Failure {
             Failure::Unusable(e.to_string())
         }
         _ => Failure::Refused(e.to_string()),
+    }
+}
+
+fn print(found: &[JointFriction], notes: &[String]) {
+    notes.iter().for_each(|note| output::print(&format!("note: {note}")));
+    for joint in found {
+        let chosen = &joint.laws[joint.chosen];
+        output::print(&format!(
+            "joint {}: {} fits best on velocities left out ({:.4} N·m); tanh friction (Eq. 16): {}",
+            joint.joint + 1,
+            chosen.fitted.law.name(),
+            chosen.held_out,
+            joint.laws[0].fitted.gamma().map_or(String::new(), |g| g.map(number).join(", "))
+        ));
     }
 }
 

@@ -4,7 +4,7 @@ use super::Failure;
 use super::bus::{Consent, Where, virtual_bus};
 use super::envelope::Surroundings;
 use super::output::{self, Progress};
-use crate::procedure::warm_up::{Seen, Settings, Warmth, swing, warm_up};
+use crate::procedure::warm_up::{Seen, WarmUpSettings, Warmth, swing, warm_up};
 use crate::procedure::{Behind, RecordError, Recorder, resume};
 use crate::report::{Figure, Ink, Page, Panel, Series};
 use clap::Args;
@@ -53,18 +53,7 @@ pub(crate) struct WarmUp {
 
 impl WarmUp {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let settings =
-            Settings { period: self.period, share: self.share, tolerance: self.tolerance, most: self.most };
-        for (name, value, most) in [
-            ("--period", self.period, 60.0),
-            ("--share", self.share, 0.95),
-            ("--tolerance", self.tolerance, 1.0),
-            ("--most", self.most, f64::MAX),
-        ] {
-            if !(value > 0.0 && value <= most) {
-                return Err(Failure::Unusable(format!("{name} must be above 0 and at most {most}")));
-            }
-        }
+        let settings = self.settings()?;
         std::fs::create_dir_all(&self.out)
             .map_err(|e| Failure::Unusable(format!("{}: cannot be made: {e}", self.out.display())))?;
         let progress = Progress::new();
@@ -87,19 +76,7 @@ impl WarmUp {
         if start > 0.0 && !self.place.json {
             output::print(&format!("continuing {} after {start:.0} s", path.display()));
         }
-        let bus: Box<dyn Bus> = match self.place.bus {
-            // A cold one, or there would be nothing to see; one that has been swung before is as warm as it
-            // was then.
-            BusUrl::Virtual => {
-                let broken = |e: String| Failure::Refused(format!("the built-in arm: {e}"));
-                let mut setup = lwa4p::setup([0.0; 6], 1).map_err(|e| broken(e.to_string()))?;
-                setup.plant =
-                    setup.plant.with(PlantEffect::Temperature { change: -0.25, time_constant: 120.0 });
-                setup.age = start;
-                virtual_bus(VirtualArm::new(setup).ok_or_else(|| broken("its parts do not fit".into()))?)?
-            }
-            _ => self.place.open()?,
-        };
+        let bus = self.bus(start)?;
         let mut recorder =
             Recorder::enable(self.place.driver(bus, self.consent)?, envelope).map_err(refused)?;
         let mut log = Behind::new(log);
@@ -116,24 +93,11 @@ impl WarmUp {
         let text = output::json(&warmth.json())?;
         output::write(&self.out, "warm_up.json", text.as_bytes())?;
         output::write(&self.out, "report.html", page(&warmth).to_html().as_bytes())?;
-        if self.place.json {
-            output::print(&text);
-        } else {
-            for (j, joint) in warmth.joints.iter().enumerate() {
-                let Some(curve) = joint.curve else { continue };
-                output::print(&format!(
-                    "joint {}: {:.3} N·m when warm, {:+.3} at the start, time constant {:.0} s",
-                    j + 1,
-                    curve.settled,
-                    curve.excess,
-                    curve.time_constant
-                ));
-            }
+        match self.place.json {
+            true => output::print(&text),
+            false => print(&warmth),
         }
         if warmth.warm {
-            if !self.place.json {
-                output::print(&format!("warm after {:.0} s", warmth.seconds));
-            }
             return Ok(());
         }
         Err(Failure::Refused(format!(
@@ -143,15 +107,45 @@ impl WarmUp {
             100.0 * self.tolerance
         )))
     }
-}
 
-impl WarmUp {
+    fn settings(&self) -> Result<WarmUpSettings, Failure> {
+        let settings = WarmUpSettings {
+            period: self.period,
+            share: self.share,
+            tolerance: self.tolerance,
+            most: self.most,
+        };
+        for (name, value, most) in [
+            ("--period", self.period, 60.0),
+            ("--share", self.share, 0.95),
+            ("--tolerance", self.tolerance, 1.0),
+            ("--most", self.most, f64::MAX),
+        ] {
+            if !(value > 0.0 && value <= most) {
+                return Err(Failure::Unusable(format!("{name} must be above 0 and at most {most}")));
+            }
+        }
+        Ok(settings)
+    }
+
+    /// The bus; the built-in arm has swung for `start` s. At 0 it is cold, or there would be nothing to see.
+    fn bus(&self, start: f64) -> Result<Box<dyn Bus>, Failure> {
+        if self.place.bus != BusUrl::Virtual {
+            return self.place.open();
+        }
+        let broken = |e: String| Failure::Refused(format!("the built-in arm: {e}"));
+        let mut setup = lwa4p::setup([0.0; 6], 1).map_err(|e| broken(e.to_string()))?;
+        setup.plant = setup.plant.with(PlantEffect::Temperature { change: -0.25, time_constant: 120.0 });
+        setup.age = start;
+        virtual_bus(VirtualArm::new(setup).ok_or_else(|| broken("its parts do not fit".into()))?)
+    }
+
     /// The result of an unfinished warm-up in the same folder, and the time at which this one continues, s;
     /// nothing and 0 if it starts from the beginning.
     ///
     /// An arm cools about as slowly as it warms: it counts as warm as before if it has stood for less than a
     /// fifth of the time of its swinging. The small cooling shows in the trend.
-    fn earlier(&self, settings: &Settings) -> (Seen, f64) {
+    fn earlier(&self, settings: &WarmUpSettings) -> (Seen, f64) {
         let path = self.out.join("warm_up.csv");
         let nothing = || Seen::new(swing(&LWA4P, settings));
         let json = std::fs::read_to_string(self.out.join("warm_up.json")).unwrap_or_default();
@@ -168,6 +162,22 @@ impl WarmUp {
         }
         // A second lies between the interrupted part and the continued one.
         nothing().earlier(&rows).map_or((nothing(), 0.0), |seen| (seen, last + stood.max(1.0)))
+    }
+}
+
+fn print(warmth: &Warmth) {
+    for (j, joint) in warmth.joints.iter().enumerate() {
+        let Some(curve) = joint.curve else { continue };
+        output::print(&format!(
+            "joint {}: {:.3} N·m when warm, {:+.3} at the start, time constant {:.0} s",
+            j + 1,
+            curve.settled,
+            curve.excess,
+            curve.time_constant
+        ));
+    }
+    if warmth.warm {
+        output::print(&format!("warm after {:.0} s", warmth.seconds));
     }
 }
 
