@@ -10,6 +10,7 @@
 mod body;
 pub mod constants;
 pub mod fit;
+mod input;
 mod problem;
 mod result;
 pub mod simulate;
@@ -22,6 +23,7 @@ use constants::{ALL, Constant, Found};
 use dyngen::arm::{JointKind, ParameterKind};
 use dyngen::{Arm, SetKind, Values};
 use fit::{Fitted, Free, errors, slopes};
+pub use input::{ServoInput, are_of_servos};
 use powerball_controller::JointNumber;
 use powerball_logs::Progress;
 use powerball_logs::log::ServoLog;
