@@ -60,7 +60,7 @@ impl Identified {
 /// A fit of torques, or of position servos.
 #[derive(IntoPyObject)]
 pub(crate) enum Fit {
-    Torques(Identified),
+    Torques(Py<Identified>),
     Servos(Written),
 }
 
@@ -119,7 +119,7 @@ pub(crate) fn identify(
     let identified = identified.map_err(failure)?;
     let additions: Option<&Additions> = known.as_ref().map(|known| &known.model.additions);
     let files = report::identified::files(&identified, additions).map_err(refused)?;
-    Ok(Fit::Torques(Identified { side: Side::of("", &identified), files }))
+    Py::new(py, Identified { side: Side::of("", &identified), files }).map(Fit::Torques)
 }
 
 /// What a joint's friction coefficients in covariance.json are multiplied with at a velocity.
