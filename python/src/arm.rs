@@ -29,8 +29,10 @@ pub(crate) struct Origin {
 pub(crate) struct Arm {
     pub(crate) arm: dyngen::Arm,
     pub(crate) origin: Option<Origin>,
+    /// The arm file, where the arm is of one.
+    pub(crate) file: Option<PathBuf>,
     text: String,
-    values: Vec<(String, f64)>,
+    pub(crate) values: Vec<(String, f64)>,
     base: Option<[[f64; 4]; 4]>,
     notes: Vec<String>,
     model: OnceLock<Arc<Model>>,
@@ -46,6 +48,7 @@ impl Arm {
             notes: arm.notes(),
             arm,
             origin: None,
+            file: None,
             text,
             values: Vec::new(),
             base: None,
@@ -112,7 +115,8 @@ impl Arm {
     /// An arm from the text of an arm file.
     #[staticmethod]
     fn parse(text: String, file: &str) -> PyResult<Arm> {
-        Ok(Arm::new(dyngen::Arm::parse(&text, file).map_err(input)?, text))
+        let arm = Arm::new(dyngen::Arm::parse(&text, file).map_err(input)?, text);
+        Ok(Arm { file: Some(file.into()), ..arm })
     }
 
     /// An arm from the text of a URDF or of a MuJoCo model.
@@ -231,6 +235,7 @@ impl Arm {
         Ok(Arm {
             arm,
             origin: None,
+            file: self.file.clone(),
             text: self.text.clone(),
             values: self.values.clone(),
             base: self.base,

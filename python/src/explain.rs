@@ -2,12 +2,14 @@
 
 use crate::arm::Arm;
 use crate::failure::{input, refused};
-use crate::identify::{ModelText, model_file};
+use crate::identify::{ModelText, Written, model_file};
 use crate::logs::{Given, column_map, taken};
 use crate::motion::Trajectory;
+use crate::servos::{Masses, Servos};
 use crate::work;
 use powerball::ExplainOptions;
 use powerball::explanation::{ExplainError, Prepared, Rule};
+use powerball::identification::servo::are_of_servos;
 use powerball::identification::{IdentifyError, Recorded};
 use powerball::report::{self, Files};
 use pyo3::prelude::*;
@@ -50,9 +52,16 @@ impl Explained {
     }
 }
 
+/// An explanation of torques, or of position servos.
+#[derive(IntoPyObject)]
+pub(crate) enum Explanation {
+    Torques(Explained),
+    Servos(Written),
+}
+
 /// Explains what the base model of an arm lacks on logs.
 #[pyfunction]
-#[pyo3(signature = (arm, log, validate, map, model, rule, progress))]
+#[pyo3(signature = (arm, log, validate, map, model, values, rule, progress))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn explain(
     py: Python<'_>,
@@ -61,12 +70,18 @@ pub(crate) fn explain(
     validate: Vec<Given<'_>>,
     map: Vec<String>,
     model: Option<ModelText>,
+    values: Masses,
     rule: &str,
     progress: Option<Bound<'_, PyAny>>,
-) -> PyResult<Explained> {
-    let (arm, map) = (arm.arm.clone(), column_map(&map)?);
+) -> PyResult<Explanation> {
+    let map = column_map(&map)?;
     let rule = Rule::from_json(rule).map_err(input)?;
-    let (logs, validate) = (taken(&arm, &log, &map)?, taken(&arm, &validate, &map)?);
+    let (logs, validate) = (taken(&arm.arm, &log, &map)?, taken(&arm.arm, &validate, &map)?);
+    if are_of_servos(&logs.sources, &arm.arm) {
+        let servos = Servos::new(arm, values, model.is_some(), (logs, validate))?;
+        return servos.explain(py, rule, progress.as_ref()).map(Explanation::Servos);
+    }
+    let arm = arm.arm.clone();
     let name = model.as_ref().map(|(_, name)| name.clone());
     let known = model.as_ref().map(model_file).transpose()?.map(|file| file.model);
     let done = work::run(py, progress.as_ref(), move |progress| -> Result<_, Why> {
@@ -93,7 +108,7 @@ pub(crate) fn explain(
         files = files.with(powerball::explanation::experiment::TRAJECTORY, motion.to_csv());
     }
     let model = report::files::json(&explained.model).map_err(refused)?;
-    Ok(Explained { files, model, trajectory: motion.map(Trajectory) })
+    Ok(Explanation::Torques(Explained { files, model, trajectory: motion.map(Trajectory) }))
 }
 
 /// Every threshold of `explain` with its default, as JSON.

@@ -3,10 +3,12 @@
 use crate::arm::Arm;
 use crate::failure::{input, refused, value};
 use crate::logs::{Given, column_map, taken};
+use crate::servos::{Masses, Servos};
 use crate::work;
 use powerball::comparison::{CompareError, CompareOptions};
 use powerball::explanation::torque_model::{Additions, ModelFile};
 use powerball::identification::estimate::FrictionKind;
+use powerball::identification::servo::are_of_servos;
 use powerball::identification::{Estimator, IdentifyError, KnownModel, VerifyOptions};
 use powerball::report::{self, Files};
 use powerball::{IdentifyOptions, Side};
@@ -55,9 +57,16 @@ impl Identified {
     }
 }
 
-/// Fits the minimal set and friction to logs.
+/// A fit of torques, or of position servos.
+#[derive(IntoPyObject)]
+pub(crate) enum Fit {
+    Torques(Py<Identified>),
+    Servos(Written),
+}
+
+/// Fits the minimal set and friction to logs, or constants of position servos.
 #[pyfunction]
-#[pyo3(signature = (arm, log, validate, map, model, friction, estimator, progress))]
+#[pyo3(signature = (arm, log, validate, map, model, values, friction, estimator, progress))]
 pub(crate) fn identify(
     py: Python<'_>,
     arm: &Arm,
@@ -65,10 +74,11 @@ pub(crate) fn identify(
     validate: Vec<Given<'_>>,
     map: Vec<String>,
     model: Option<ModelText>,
+    values: Masses,
     friction: &str,
     estimator: &str,
     progress: Option<Bound<'_, PyAny>>,
-) -> PyResult<Identified> {
+) -> PyResult<Fit> {
     let friction = match friction {
         "symmetric" => FrictionKind::Symmetric,
         "asymmetric" => FrictionKind::Asymmetric,
@@ -83,8 +93,13 @@ pub(crate) fn identify(
             return Err(value(format!("{what} '{estimator}'")));
         }
     };
-    let (arm, map) = (arm.arm.clone(), column_map(&map)?);
-    let (logs, validate) = (taken(&arm, &log, &map)?, taken(&arm, &validate, &map)?);
+    let map = column_map(&map)?;
+    let (logs, validate) = (taken(&arm.arm, &log, &map)?, taken(&arm.arm, &validate, &map)?);
+    if are_of_servos(&logs.sources, &arm.arm) {
+        let servos = Servos::new(arm, values, model.is_some(), (logs, validate))?;
+        return servos.identify(py, progress.as_ref()).map(Fit::Servos);
+    }
+    let arm = arm.arm.clone();
     let known = model.as_ref().map(model_file).transpose()?;
     let (identified, known) = work::run(py, progress.as_ref(), move |progress| {
         let options = IdentifyOptions {
@@ -104,7 +119,7 @@ pub(crate) fn identify(
     let identified = identified.map_err(failure)?;
     let additions: Option<&Additions> = known.as_ref().map(|known| &known.model.additions);
     let files = report::identified::files(&identified, additions).map_err(refused)?;
-    Ok(Identified { side: Side::of("", &identified), files })
+    Py::new(py, Identified { side: Side::of("", &identified), files }).map(Fit::Torques)
 }
 
 /// What a joint's friction coefficients in covariance.json are multiplied with at a velocity.
@@ -141,7 +156,7 @@ pub(crate) fn verify(
 
 /// A result that is there as its files.
 #[pyclass(frozen, module = "powerball._core")]
-pub(crate) struct Written(Files);
+pub(crate) struct Written(pub(crate) Files);
 
 #[pymethods]
 impl Written {

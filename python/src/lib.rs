@@ -11,6 +11,7 @@ mod failure;
 mod identify;
 mod logs;
 mod motion;
+mod servos;
 mod session;
 mod simulate;
 mod source;

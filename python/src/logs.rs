@@ -6,7 +6,7 @@ use crate::summary::Summary;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use powerball::Log;
 use powerball::identification::{Input, Recorded, Source};
-use powerball::logs::log::{ColumnMap, inspect as look};
+use powerball::logs::log::{ColumnMap, Finding, ServoLog, are_of_servos, inspect as look};
 use pyo3::prelude::*;
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -44,7 +44,7 @@ pub(crate) fn taken(arm: &dyngen::Arm, logs: &[Given<'_>], map: &Arc<ColumnMap>)
             (None, None) => match in_memory(arm, given, map)? {
                 Ok((log, found)) => {
                     findings.extend(found);
-                    Source::from(Input::Log(Cow::Owned(log)))
+                    Source::from(log)
                 }
                 Err(why) => {
                     wrong.push(why);
@@ -58,7 +58,7 @@ pub(crate) fn taken(arm: &dyngen::Arm, logs: &[Given<'_>], map: &Arc<ColumnMap>)
 }
 
 /// The log with what is odd about it, or why it is none.
-type Read = Result<(Log, Vec<String>), String>;
+type Read = Result<(Input<'static>, Vec<String>), String>;
 
 fn in_memory(arm: &dyngen::Arm, given: &Given<'_>, map: &ColumnMap) -> PyResult<Read> {
     let slice = |(name, array): &(String, PyReadonlyArray1<'_, f64>)| -> PyResult<(String, Vec<f64>)> {
@@ -67,8 +67,14 @@ fn in_memory(arm: &dyngen::Arm, given: &Given<'_>, map: &ColumnMap) -> PyResult<
     };
     let columns = given.columns.iter().map(slice).collect::<PyResult<Vec<_>>>()?;
     let columns: Vec<(String, &[f64])> = columns.iter().map(|(n, x)| (n.clone(), x.as_slice())).collect();
-    let read = Log::from_columns_as(&given.name, arm, &columns, map);
-    let words = |found: Vec<powerball::logs::log::Finding>| found.iter().map(ToString::to_string).collect();
+    let names: Vec<String> = columns.iter().map(|(name, _)| name.clone()).collect();
+    let read = match are_of_servos(&names, arm, map) {
+        true => ServoLog::from_columns_as(&given.name, arm, &columns, map)
+            .map(|(log, found)| (Input::Servos(Cow::Owned(log)), found)),
+        false => Log::from_columns_as(&given.name, arm, &columns, map)
+            .map(|(log, found)| (Input::Log(Cow::Owned(log)), found)),
+    };
+    let words = |found: Vec<Finding>| found.iter().map(ToString::to_string).collect();
     Ok(read.map(|(log, found)| (log, words(found))).map_err(|e| e.to_string()))
 }
 

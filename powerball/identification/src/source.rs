@@ -7,7 +7,7 @@ use super::identify::{Gathering, IdentifyError};
 use super::mounting::Mounting;
 use dyngen::Arm;
 use powerball_logs::Progress;
-use powerball_logs::log::{ColumnMap, Log, notes_of};
+use powerball_logs::log::{ColumnMap, Log, ServoLog, notes_of};
 use powerball_logs::regression::DataOptions;
 use powerball_logs::summary::{Bands, Summary};
 use powerball_logs::tables::is_address;
@@ -37,7 +37,9 @@ pub enum Input<'a> {
     Log(Cow<'a, Log>),
     /// The R factors of logs, as `powerball summarize` writes them.
     Summary(Cow<'a, Bands>),
-    /// A file with either, recognised by its content.
+    /// The samples of a log of position servos.
+    Servos(Cow<'a, ServoLog>),
+    /// A file with any of these, recognised by its content.
     File(Cow<'a, Path>),
 }
 
@@ -65,6 +67,7 @@ impl<'a> Source<'a> {
     pub fn name(&self) -> String {
         match &self.input {
             Input::Log(log) => log.file.clone(),
+            Input::Servos(log) => log.file.clone(),
             Input::File(path) => path.display().to_string(),
             Input::Summary(bands) => {
                 let logs: Vec<&str> = bands.widest().logs.iter().map(|(name, _)| name.as_str()).collect();
@@ -153,6 +156,7 @@ impl<'a> From<&'a Source<'_>> for Source<'a> {
         let input = match &source.input {
             Input::Log(log) => Input::Log(Cow::Borrowed(log.as_ref())),
             Input::Summary(bands) => Input::Summary(Cow::Borrowed(bands.as_ref())),
+            Input::Servos(log) => Input::Servos(Cow::Borrowed(log.as_ref())),
             Input::File(path) => Input::File(Cow::Borrowed(path.as_ref())),
         };
         Source { input, mounting: source.mounting, map: Arc::clone(&source.map) }

@@ -28,6 +28,16 @@ from .identification import (
 )
 from .reading import Recording, inspect, read_log
 from .rule import Rule
+from .servos import (
+    ExplainedServos,
+    IdentifiedServos,
+    JointServo,
+    PositionErrors,
+    ServoConstant,
+    ServoEffect,
+    ServoFriction,
+    ServoVerdict,
+)
 from .simulation import Simulated, simulate
 from .source import export, generate
 from .summary import Summary, summarize
@@ -42,9 +52,12 @@ __all__ = [
     "Error",
     "Excited",
     "Explained",
+    "ExplainedServos",
     "Identified",
+    "IdentifiedServos",
     "InputError",
     "JointFriction",
+    "JointServo",
     "JointVerdict",
     "Law",
     "Limits",
@@ -52,9 +65,14 @@ __all__ = [
     "Mounted",
     "ParameterEstimate",
     "ParameterSet",
+    "PositionErrors",
     "Recording",
     "RefusedError",
     "Rule",
+    "ServoConstant",
+    "ServoEffect",
+    "ServoFriction",
+    "ServoVerdict",
     "Session",
     "SetParameter",
     "Simulated",

@@ -1,6 +1,6 @@
 """The compiled part: plain values in and out. Use the package's own classes."""
 
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, final
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,6 +98,7 @@ class Arm:
 
 _Tell = Optional[Callable[[str], object]]
 _Text = Tuple[str, str]
+_Masses = Tuple[Optional[str], Dict[str, float]]
 
 @final
 class Identified:
@@ -150,10 +151,11 @@ def identify(
     validate: Sequence[Any],
     map: List[str],
     model: Optional[_Text],
+    values: Optional[_Masses],
     friction: str,
     estimator: str,
     progress: _Tell,
-) -> Identified: ...
+) -> Union[Identified, Written]: ...
 def friction_row(gamma2: float, gamma4: float, velocity: float) -> List[float]: ...
 def verify(
     arm: Arm,
@@ -171,9 +173,10 @@ def explain(
     validate: Sequence[Any],
     map: List[str],
     model: Optional[_Text],
+    values: Optional[_Masses],
     rule: str,
     progress: _Tell,
-) -> Explained: ...
+) -> Union[Explained, Written]: ...
 def rule() -> str: ...
 def read_log(
     arm: Arm, log: Any, map: List[str]

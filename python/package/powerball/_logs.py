@@ -20,7 +20,7 @@ class Log:
 
     Quantities have shape (N, n): N samples of n joints. Torques count before currents, which need the arm
     file's torque constants. Velocities check positions and times; those of the fit are computed from
-    positions.
+    positions. A log with ``goal`` and neither torques nor currents is one of position servos.
     """
 
     #: Times, (N,), s; they may start anywhere.
@@ -39,6 +39,12 @@ class Log:
     motor: Optional[ArrayLike] = None
     #: What messages call it.
     name: Optional[str] = None
+    #: Set-points of position servos, rad.
+    goal: Optional[ArrayLike] = None
+    #: Voltages of the drives, V.
+    volts: Optional[ArrayLike] = None
+    #: Whether each drive is switched on, 0 or 1.
+    torque_enable: Optional[ArrayLike] = None
 
 
 @dataclass(frozen=True)
@@ -101,7 +107,7 @@ def _given(log: Any, name: str, mounting: Optional[str]) -> Given:
     if _is_summary(log):
         return Given(None, name, mounting=mounting, summary=log._core)
     if _is_samples(log):
-        kept = ("t", "q", "tau", "i", "dq", "temp", "motor")
+        kept = ("t", "q", "tau", "i", "dq", "temp", "motor", "goal", "volts", "torque_enable")
         quantities = {key: getattr(log, key) for key in kept if getattr(log, key, None) is not None}
         return Given(None, getattr(log, "name", None) or name, _columns(quantities, name), mounting)
     if isinstance(log, Mapping):

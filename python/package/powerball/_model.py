@@ -13,12 +13,13 @@ from ._errors import InputError
 if TYPE_CHECKING:
     from .explanation import Explained
     from .identification import Identified
+    from .servos import IdentifiedServos
 
 #: A torque model: a result of ``identify`` or ``explain``, its JSON file, or its dict.
 Model = Union["Identified", "Explained", PathLike, Mapping[str, Any]]
 
 
-def model_text(model: Model) -> Tuple[str, str]:
+def model_text(model: Union[Model, IdentifiedServos]) -> Tuple[str, str]:
     """The model as JSON, and the name that errors give it."""
     if isinstance(model, Mapping):
         return json.dumps(model), "the model"

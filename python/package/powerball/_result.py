@@ -63,7 +63,20 @@ class Result:
         return list(self._json.get("warnings", []))
 
 
-class OfLogs(Result):
+class Judged(Result):
+    """A result that says whether it should be used."""
+
+    @property
+    def unusable(self) -> List[str]:
+        """Why this result should not be used (exit 3 of the command); empty where it can be."""
+        return list(self._json.get("unusable", []))
+
+    def _repr_unusable(self) -> str:
+        reasons = (f"Do not use this result: {reason}." for reason in self.unusable)
+        return "".join(paragraph(reason, strong=True) for reason in reasons)
+
+
+class OfLogs(Judged):
     """A result that says what the columns of its logs are."""
 
     @property
@@ -71,11 +84,6 @@ class OfLogs(Result):
         """What the columns of the logs are: signs, units, gravity, delay; and the map that corrects them."""
         parsed: Optional[Dict[str, Any]] = self._json.get("conventions")
         return parsed
-
-    @property
-    def unusable(self) -> List[str]:
-        """Why this result should not be used (exit 3 of the command); empty where it can be."""
-        return list(self._json.get("unusable", []))
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
@@ -101,3 +109,19 @@ def error_rows(columns: Sequence[Optional[Spread]]) -> List[List[str]]:
         cells = [f"{s.rms[j]:.4f} N·m, {100 * s.relative[j]:.1f} %" for s in there]
         rows.append([str(j + 1), *cells])
     return rows
+
+
+def joints_in_words(joints: Sequence[int]) -> str:
+    """Joints by their numbers; none are the whole arm."""
+    return "joint " + ", ".join(map(str, joints)) if joints else "the arm"
+
+
+def figures(parameters: Dict[str, Any]) -> str:
+    """Parameters of an effect in one line."""
+
+    def short(value: Any) -> str:
+        if isinstance(value, float):
+            return f"{value:.4g}"
+        return "[" + ", ".join(map(short, value)) + "]" if isinstance(value, list) else str(value)
+
+    return ", ".join(f"{name} {short(value)}" for name, value in parameters.items())

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Any, Dict, List, Optional, Tuple, Union
 
 from . import _core
-from ._arrays import Array
+from ._arrays import Array, Values
 from ._logs import Logs, given
 from ._model import Model, optional_model
 from ._progress import Progress, listener
-from ._result import OfLogs, Spread, numbers, paragraph, spread, table
+from ._result import OfLogs, Spread, figures, joints_in_words, numbers, paragraph, spread, table
 from .arm import Arm
 from .identification import Map, said
 from .rule import Rule, rule_text
+from .servos import ExplainedServos, masses
 
 
 @dataclass(frozen=True)
@@ -217,12 +218,12 @@ class Explained(OfLogs):
         return str(self._core.model_json())
 
     def __repr__(self) -> str:
-        named = ", ".join(f"{e.effect} on {_joints(e.joints)}" for e in self.effects) or "no effect"
+        named = ", ".join(f"{e.effect} on {joints_in_words(e.joints)}" for e in self.effects) or "no effect"
         return f"<Explained {self._json['arm']}: {named}>"
 
     def _repr_html_(self) -> str:
         effects = [
-            [e.effect, _joints(e.joints), _figures(e.parameters), f"{100 * e.probability:.0f} %"]
+            [e.effect, joints_in_words(e.joints), figures(e.parameters), f"{100 * e.probability:.0f} %"]
             for e in self.effects
         ]
         named = table(["effect", "joints", "parameters", "probability"], effects) if effects else ""
@@ -233,25 +234,12 @@ class Explained(OfLogs):
         lead = paragraph(named and "What the model lacks" or "No effect was named.", strong=True)
         formulas = "".join(paragraph(f"Without a name: {law.formula}") for law in self.laws)
         return (
-            "".join(paragraph(f"Do not use this result: {reason}.", strong=True) for reason in self.unusable)
+            self._repr_unusable()
             + lead
             + named
             + formulas
             + table(["joint", "verdict", "base model", "with effects", "advice"], rows)
         )
-
-
-def _joints(joints: List[int]) -> str:
-    return "joint " + ", ".join(map(str, joints)) if joints else "the arm"
-
-
-def _figures(parameters: Dict[str, Any]) -> str:
-    def short(value: Any) -> str:
-        if isinstance(value, float):
-            return f"{value:.4g}"
-        return "[" + ", ".join(map(short, value)) + "]" if isinstance(value, list) else str(value)
-
-    return ", ".join(f"{name} {short(value)}" for name, value in parameters.items())
 
 
 def explain(
@@ -261,14 +249,18 @@ def explain(
     *,
     map: Optional[Map] = None,
     model: Optional[Model] = None,
+    values: Optional[Values] = None,
     rule: Optional[Rule] = None,
     progress: Progress = False,
-) -> Explained:
+) -> Union[Explained, ExplainedServos]:
     """Finds, names and adds what the model lacks on logs; every addition is judged on logs of another path.
 
     Logs as for :func:`identify`, in the order in which they were recorded. ``model`` is what is known
     already: it is taken out of the logs as it stands, and what is found comes to it. ``rule`` has every
     threshold by which this is decided.
+
+    Logs of position servos (columns ``goal1`` … and no torque) give ``ExplainedServos``. ``values`` are then
+    the arm's masses, as :func:`identify` takes them.
 
     Raises: ``InputError`` where logs or the rule cannot be used, ``RefusedError`` where they hold too little.
     """
@@ -279,7 +271,8 @@ def explain(
             given(validate, "validate"),
             said(map),
             optional_model(model),
+            masses(values),
             rule_text(rule or Rule()),
             tell,
         )
-    return Explained(core)
+    return ExplainedServos(core) if isinstance(core, _core.Written) else Explained(core)

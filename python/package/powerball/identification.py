@@ -9,12 +9,13 @@ from typing import Any, Dict, List, Optional, Sequence, Union
 import numpy as np
 
 from . import _core
-from ._arrays import Array, PathLike
+from ._arrays import Array, PathLike, Values
 from ._logs import LogLike, Logs, given
 from ._model import Model, model_text, optional_model
 from ._progress import Progress, listener
 from ._result import OfLogs, Result, Spread, error_rows, numbers, paragraph, spread, table
 from .arm import Arm
+from .servos import IdentifiedServos, masses
 
 #: How columns are read: a TOML file, lines of one such as 'tau.sign = -1', or several of both.
 Map = Union[str, PathLike, Sequence[str]]
@@ -116,7 +117,7 @@ class Identified(OfLogs):
         head = ["joint", "fit", "validation"] if self.validate else ["joint", "fit"]
         possible = "" if self.physically_consistent else " No real arm can have these values."
         return (
-            "".join(paragraph(f"Do not use this result: {reason}.", strong=True) for reason in self.unusable)
+            self._repr_unusable()
             + paragraph(f"{self._json['arm']}: {len(self.parameters)} parameters.{possible}", strong=True)
             + table(head, error_rows([self.fit, self.validate]))
             + "".join(paragraph(warning) for warning in self.warnings)
@@ -130,16 +131,21 @@ def identify(
     *,
     map: Optional[Map] = None,
     model: Optional[Model] = None,
+    values: Optional[Values] = None,
     friction: str = "symmetric",
     estimator: str = "weighted",
     progress: Progress = False,
-) -> Identified:
+) -> Union[Identified, IdentifiedServos]:
     """Fits the minimal inertial set and the friction of every joint (Eq. 16) to logs.
 
     ``log`` and ``validate`` are one log or several: files that the command reads, dicts or frames with the
     columns ``t``, ``q1`` …, ``tau1`` … or ``i1`` …, ``Log`` objects, or ``Mounted`` ones. ``friction`` is
     "symmetric" or "asymmetric"; ``estimator`` is "weighted", "robust" or "instrumental"; ``model`` is what is
     known already.
+
+    Logs of position servos (columns ``goal1`` … and no torque) give ``IdentifiedServos``: the closed loop of
+    each joint. ``values`` are then the arm's masses: those of all its parameters, by name or as a JSON file;
+    where they are not given, those of the robot description or of ``ARM.values.json`` next to the arm file.
 
     Raises: ``InputError`` where logs cannot be used, ``RefusedError`` where they have no answer.
     """
@@ -150,11 +156,12 @@ def identify(
             given(validate, "validate"),
             said(map),
             optional_model(model),
+            masses(values),
             friction,
             estimator,
             tell,
         )
-    return Identified(core)
+    return IdentifiedServos(core) if isinstance(core, _core.Written) else Identified(core)
 
 
 @dataclass(frozen=True)
@@ -297,4 +304,7 @@ def _side(
         name = path
     if arm is None:
         raise ValueError(f"{name} is no result of identify; for a log or a summary give its arm as arm=")
-    return _side(identify(arm, side, map=map, progress=progress), name, None, None, False)
+    found = identify(arm, side, map=map, progress=progress)
+    if isinstance(found, IdentifiedServos):
+        raise ValueError(f"{name} is of position servos: fits of torques are compared")
+    return _side(found, name, None, None, False)

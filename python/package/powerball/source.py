@@ -13,6 +13,7 @@ from ._model import Model, model_text
 from .arm import Arm
 from .explanation import Explained
 from .identification import Identified
+from .servos import IdentifiedServos
 
 
 def generate(
@@ -50,7 +51,7 @@ def export(
     arm: Arm,
     values: Union[Identified, PathLike, Mapping[str, float]],
     *,
-    friction: Union[None, bool, Identified, Explained, PathLike] = None,
+    friction: Union[None, bool, Identified, IdentifiedServos, Explained, PathLike] = None,
     uncertain: bool = False,
     output: Optional[PathLike] = None,
 ) -> str:
@@ -59,9 +60,9 @@ def export(
     Written to ``output`` too, where that is given. ``values`` are a result of ``identify``, of which the
     nearest real arm is taken, or values of all parameters. ``friction`` is where damping and friction are
     from; a result brings its own, unless it is ``False``. That of ``explain`` has effects, of which a MuJoCo
-    model gets ripple, presliding and Stribeck's friction. Damping that is not larger than its own standard
-    error stays as it was, unless ``uncertain`` asks for it. What is to be reported about the new file is
-    given as a warning.
+    model gets ripple, presliding and Stribeck's friction. That of position servos has drives, which a MuJoCo
+    model gets as ``<position>`` actuators. Damping that is not larger than its own standard error stays as it
+    was, unless ``uncertain`` asks for it. What is to be reported about the new file is given as a warning.
     """
     if isinstance(values, Mapping):
         text = (json.dumps(dict(values)), "values")

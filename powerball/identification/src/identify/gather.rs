@@ -216,6 +216,10 @@ impl<'a> Gathering<'a> {
         match &source.input {
             Input::Log(log) => self.take_log(&source.name(), log.as_ref().clone(), said),
             Input::Summary(summary) => self.take_summary(&source.name(), summary, said),
+            Input::Servos(_) => {
+                self.unusable.push(of_servos(source));
+                Ok(())
+            }
             Input::File(path) => self.take_file(&source.name(), path, &source.map, said),
         }
     }
@@ -475,7 +479,7 @@ impl Recorded {
 ///
 /// # Errors
 /// [`IdentifyError::Setting`] and [`IdentifyError::JudgesItself`].
-pub(super) fn no_log_in_both(logs: &[Source<'_>], validate: &[Source<'_>]) -> Result<(), IdentifyError> {
+pub(crate) fn no_log_in_both(logs: &[Source<'_>], validate: &[Source<'_>]) -> Result<(), IdentifyError> {
     if logs.is_empty() {
         return Err(IdentifyError::Setting("there is no log to fit: give at least one".to_string()));
     }
@@ -483,6 +487,11 @@ pub(super) fn no_log_in_both(logs: &[Source<'_>], validate: &[Source<'_>]) -> Re
         Some(both) => Err(IdentifyError::JudgesItself(both.name())),
         None => Ok(()),
     }
+}
+
+/// Why a log of position servos is not taken.
+fn of_servos(source: &Source<'_>) -> String {
+    format!("{}: is of position servos (goal1 … and no torque): logs with torques are needed", source.name())
 }
 
 /// The samples of a source; what is odd about a file is added to `warnings`.
@@ -496,6 +505,7 @@ pub(super) fn samples(
         Input::Summary(_) => {
             Err(vec![format!("{}: single samples are needed: give the log itself", source.name())])
         }
+        Input::Servos(_) => Err(vec![of_servos(source)]),
         Input::File(path) => {
             let mut findings = Vec::new();
             let read = read_log_as(path, arm, &source.map, &mut findings);

@@ -20,7 +20,7 @@ pub use fit::{Along, JointAlong, LogFacts};
 use fit::{Fitted, fit};
 pub use gather::Recorded;
 use gather::{Gathered, Mounted};
-pub(crate) use gather::{Gathering, InMemory, one_mounting};
+pub(crate) use gather::{Gathering, InMemory, no_log_in_both, one_mounting};
 pub use judge::MountedFit;
 pub(crate) use judge::by_band;
 use powerball_logs::Progress;

@@ -10,6 +10,7 @@
 mod body;
 pub mod constants;
 pub mod fit;
+mod input;
 mod problem;
 mod result;
 pub mod simulate;
@@ -22,12 +23,14 @@ use constants::{ALL, Constant, Found};
 use dyngen::arm::{JointKind, ParameterKind};
 use dyngen::{Arm, SetKind, Values};
 use fit::{Fitted, Free, errors, slopes};
+pub use input::{ServoInput, are_of_servos};
 use powerball_controller::JointNumber;
 use powerball_logs::Progress;
 use powerball_logs::log::ServoLog;
 use powerball_logs::regression::RigidArm;
 pub use problem::{Known, Problem, Role};
 pub use result::{Along, IdentifiedServos, JointServo, PositionStats, ServoFriction, no_torques};
+use std::borrow::Cow;
 pub use uncertainty::standard_errors;
 
 /// Delays of the goal that are tried for its error, s.
@@ -70,7 +73,7 @@ impl ServoArm {
         }
         let body = RigidArm::new(arm)?;
         let set = body.model().set(SetKind::Minimal)?;
-        let of_set = |values: &Values| values.of_set(body.model(), set);
+        let of_set = |values: &Values| without_rotors(arm, values).of_set(body.model(), set);
         let values = values.map(of_set).transpose().map_err(|e| IdentifyError::Known(e.to_string()))?;
         let payload = body.model().set_values(set, &point_mass(arm));
         Ok(ServoArm { body, values, payload, tool: tool(arm) })
@@ -86,6 +89,23 @@ impl ServoArm {
 
 fn tool(arm: &Arm) -> [f64; 3] {
     arm.tool.as_ref().map_or([0.0; 3], |tool| tool.xyz.each_ref().map(dyngen::exact::rational::to_f64))
+}
+
+/// Values of the bodies alone: an armature is rotor and gear together, whether the arm file gives it or the
+/// logs do.
+fn without_rotors<'v>(arm: &Arm, values: &'v Values) -> Cow<'v, Values> {
+    let all = arm.all_parameters();
+    let rotors: Vec<String> =
+        all.iter().filter(|p| p.kind == ParameterKind::Im).map(ToString::to_string).collect();
+    let is_rotor = |name: &str| rotors.iter().any(|rotor| rotor == name);
+    if !values.names().any(is_rotor) {
+        return Cow::Borrowed(values);
+    }
+    let bodies = values.names().map(|name| match is_rotor(name) {
+        true => (name, 0.0),
+        false => (name, values.get(name).unwrap_or(0.0)),
+    });
+    Cow::Owned(Values::named(bodies, "the masses"))
 }
 
 /// All parameters of 1 kg where the arm's last frame or its tool is.

@@ -28,7 +28,7 @@ pub use live::{LiveRows, LiveSample, Taken};
 pub use map::{ByJoint, Clock, ColumnMap, Mapped};
 pub use motors::{Motors, logs_of_motors, notes_of};
 pub use read::{read_log, read_log_as, read_logs, read_logs_as};
-pub use servo::{ServoLog, is_of_servos};
+pub use servo::{ServoLog, are_of_servos, is_of_servos};
 use signal_checks::{Severity, Warnings};
 pub use times::common_clock;
 pub use topics::{Alignment, alignment};

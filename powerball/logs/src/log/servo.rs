@@ -62,8 +62,21 @@ impl ServoLog {
         arm: &Arm,
         columns: &[(String, &[f64])],
     ) -> Result<(ServoLog, Vec<Finding>), LogError> {
-        let (map, mut findings) = (ColumnMap::default(), Vec::new());
-        let asked = Asked { arm, map: &map, file: name, header: Some(1), goals: true };
+        ServoLog::from_columns_as(name, arm, columns, &ColumnMap::default())
+    }
+
+    /// As [`ServoLog::from_columns`], with a map of the columns.
+    ///
+    /// # Errors
+    /// As [`ServoLog::read`].
+    pub fn from_columns_as(
+        name: &str,
+        arm: &Arm,
+        columns: &[(String, &[f64])],
+        map: &ColumnMap,
+    ) -> Result<(ServoLog, Vec<Finding>), LogError> {
+        let mut findings = Vec::new();
+        let asked = Asked { arm, map, file: name, header: Some(1), goals: true };
         let samples = Samples::of_columns(asked, columns, &mut findings)?;
         let log = ServoLog::of(samples, false)?;
         Ok((log, findings))
@@ -98,16 +111,28 @@ impl ServoLog {
     }
 }
 
-/// Whether logs are those of position servos: the first one holds set-points and neither torques nor currents
-/// with a constant, or every joint of the arm has its `[joint.servo]` and there are no torques.
+/// Whether a file is a log of position servos: its columns are ([`are_of_servos`]), or every joint of the arm
+/// has its `[joint.servo]` where they cannot be looked at first.
 #[must_use]
 pub fn is_of_servos(path: &Path, arm: &Arm, map: &ColumnMap) -> bool {
-    let servos = arm.moving_joints().all(|joint| joint.servo.is_some());
-    let Some(names) = names(path) else { return servos };
-    let file = path.display().to_string();
-    let asked = Asked { arm, map, file: &file, header: Some(1), goals: false };
-    let has = |key: &str| group(&names, key, asked).is_ok();
-    let torques = match headers::of(&names, asked) {
+    match names(path) {
+        Some(names) => are_of_servos(&names, arm, map),
+        None => has_servos(arm),
+    }
+}
+
+fn has_servos(arm: &Arm) -> bool {
+    arm.moving_joints().all(|joint| joint.servo.is_some())
+}
+
+/// Whether columns, by their names, are those of position servos: set-points and neither torques nor currents
+/// with a constant, or no torques where every joint of the arm has its `[joint.servo]`.
+#[must_use]
+pub fn are_of_servos(names: &[String], arm: &Arm, map: &ColumnMap) -> bool {
+    let servos = has_servos(arm);
+    let asked = Asked { arm, map, file: "", header: Some(1), goals: false };
+    let has = |key: &str| group(names, key, asked).is_ok();
+    let torques = match headers::of(names, asked) {
         Headers::Clear(map, _) => map.tau.column.is_some() || map.i.column.is_some(),
         _ => false,
     };

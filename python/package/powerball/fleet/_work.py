@@ -15,7 +15,7 @@ import fsspec
 
 from .._errors import Error
 from ..arm import Arm
-from ..identification import identify
+from ..identification import Identified, identify
 from ..summary import Summary, summarize
 from . import _files
 from ._fit import Fit
@@ -68,6 +68,13 @@ def arm_of(text: str) -> Arm:
     return Arm.from_toml(text)
 
 
+def _fitted(job: Job, summary: Summary) -> Identified:
+    """The fit of a summary, which never is of position servos."""
+    found = identify(arm_of(job.arm), summary)
+    assert isinstance(found, Identified)
+    return found
+
+
 def reduce_log(job: Job, found: Found, known_file: str) -> Outcome:
     """One log into the store: its fit and its summary, or why there is none.
 
@@ -92,7 +99,7 @@ def reduce_log(job: Job, found: Found, known_file: str) -> Outcome:
             row["unit"] = unit_of(job.rule, found.log, here)
             row["date"] = date_of(job.rule, found, here)
             summary = summarize(arm_of(job.arm), here, map=list(job.map) or None)
-        model = identify(arm_of(job.arm), summary)
+        model = _fitted(job, summary)
         row.update(Fit.of(model).columns(), seconds=summary.seconds)
         row["warnings"] = [*summary.warnings, *row["warnings"]]
         data = summary.to_bytes()
@@ -158,7 +165,7 @@ class Growing:
             return Fit(*json.loads(_files.read(path)))
         self.whole = join(self.job, self.keys[self.have : count], self.whole)
         self.have = count
-        fit = Fit.of(identify(arm_of(self.job.arm), self.whole))
+        fit = Fit.of(_fitted(self.job, self.whole))
         _files.write(path, json.dumps([fit.identified, fit.covariance]).encode())
         return fit
 

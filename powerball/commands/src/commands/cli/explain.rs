@@ -21,6 +21,7 @@ use powerball_explanation::explain::{Explained, FalsePositives, NamedEffect, Riv
 use powerball_explanation::torque_model::TorqueModel;
 use powerball_explanation::{ExplainError, ExplainOptions, Prepared};
 use powerball_identification::Source;
+use powerball_identification::servo::are_of_servos;
 use powerball_logs as logs;
 use powerball_logs::motion::Motion;
 use std::path::{Path, PathBuf};
@@ -66,7 +67,7 @@ impl Explain {
         let progress = Progress::timed(self.timings);
         let arm = Arm::read(&self.inputs.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
         let [fit, validate] = sources(&self.inputs, &self.validate)?;
-        if servos::are_of_servos(&fit, &arm) {
+        if are_of_servos(&fit, &arm) {
             return self.servos((&fit, &validate), &arm, &progress, verbosity);
         }
         #[cfg(feature = "cli")]

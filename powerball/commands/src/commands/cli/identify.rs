@@ -13,6 +13,7 @@ use dyngen::import::{ImportError, Options, Source};
 use dyngen::{Arm, Values};
 use powerball_explanation::torque_model::ModelFile;
 use powerball_identification::estimate::FrictionKind;
+use powerball_identification::servo::are_of_servos;
 use powerball_identification::{
     Estimator, Identified, IdentifyOptions, KnownModel, NearestError, identify, nearest_arm,
 };
@@ -101,7 +102,7 @@ impl Identify {
         let known = known.map_err(|e| Failure::Unusable(e.to_string()))?;
         let terminal = output::Progress::timed(self.timings);
         let logs = self.logs.clone().mapped(self.map.read()?);
-        if servos::are_of_servos(&logs.log, &arm) {
+        if are_of_servos(&logs.log, &arm) {
             return self.servos(&arm, &logs, &terminal, verbosity);
         }
         let say = |what: &str| terminal.say(what);

@@ -6,10 +6,9 @@ use crate::report;
 use dyngen::{Arm, Values};
 use powerball_explanation::Rule;
 use powerball_explanation::servo::{ExplainedServos, explain_servos};
-use powerball_identification::servo::{IdentifiedServos, ServoArm, identify_servos};
-use powerball_identification::{Input, Source};
+use powerball_identification::Source;
+use powerball_identification::servo::{IdentifiedServos, ServoInput, identify_servos};
 use powerball_logs as logs;
-use powerball_logs::log::{LogError, ServoLog, is_of_servos};
 use std::path::{Path, PathBuf};
 
 /// What is known of the bodies of an arm on servos.
@@ -20,78 +19,6 @@ pub(super) struct Masses {
     /// which `dyngen import` writes next to the arm file; else torques are shares of the torque at full duty.
     #[arg(long, value_name = "FILE.json")]
     values: Option<PathBuf>,
-}
-
-impl Masses {
-    /// The values that were given, else those next to the arm file.
-    fn read(&self, arm: &Path) -> Result<Option<Values>, Failure> {
-        let imported = arm.with_extension("values.json");
-        let path = self.values.as_ref().or(imported.is_file().then_some(&imported));
-        path.map(|path| Values::read(path)).transpose().map_err(|e| Failure::Unusable(e.to_string()))
-    }
-
-    /// What is to be reported about them.
-    fn note(&self, arm: &Path) -> Option<String> {
-        let imported = arm.with_extension("values.json");
-        let is_used = self.values.is_none() && imported.is_file();
-        is_used.then(|| format!("{}: the masses are taken from it", imported.display()))
-    }
-
-    /// The arm with what is known of it.
-    pub(super) fn arm(&self, arm: &Arm, file: &Path) -> Result<ServoArm, Failure> {
-        Ok(ServoArm::new(arm, self.read(file)?.as_ref())?)
-    }
-}
-
-/// Logs of servos, and what is odd about them.
-pub(super) struct ServoLogs {
-    pub(super) fit: Vec<ServoLog>,
-    pub(super) validate: Vec<ServoLog>,
-    pub(super) warnings: Vec<String>,
-}
-
-/// Whether logs are those of position servos: the first file says it for all.
-pub(super) fn are_of_servos(logs: &[Source<'_>], arm: &Arm) -> bool {
-    logs.first().is_some_and(|source| match &source.input {
-        Input::File(path) => is_of_servos(path, arm, &source.map),
-        _ => false,
-    })
-}
-
-impl ServoLogs {
-    /// Reads all of them.
-    pub(super) fn read(fit: &[Source<'_>], validate: &[Source<'_>], arm: &Arm) -> Result<ServoLogs, Failure> {
-        let both = fit.iter().find(|a| validate.iter().any(|b| a.name() == b.name()));
-        if let Some(both) = both {
-            return Err(powerball_identification::IdentifyError::JudgesItself(both.name()).into());
-        }
-        let (mut warnings, mut errors) = (arm.notes(), Vec::new());
-        let mut read = |sources: &[Source<'_>]| -> Vec<ServoLog> {
-            let one = |source: &Source<'_>| {
-                let (Input::File(path), None) = (&source.input, source.mounting) else {
-                    errors.push(format!("{}: --mounting is of logs with torques", source.name()));
-                    return None;
-                };
-                match ServoLog::read(path, arm, &source.map) {
-                    Ok((log, findings)) => {
-                        warnings.extend(findings.iter().map(ToString::to_string));
-                        Some(log)
-                    }
-                    Err(LogError(reasons)) => {
-                        errors.extend(reasons.iter().map(ToString::to_string));
-                        None
-                    }
-                }
-            };
-            sources.iter().filter_map(one).collect()
-        };
-        let (mut fit, mut validate) = (read(fit), read(validate));
-        ServoLog::common_clock(fit.iter_mut().chain(&mut validate));
-        match errors.is_empty() {
-            true => Ok(ServoLogs { fit, validate, warnings }),
-            false => Err(Failure::Unusable(errors.join("\n"))),
-        }
-    }
 }
 
 /// What is given for an identification of servos.
@@ -106,12 +33,11 @@ pub(super) struct Asked<'a> {
 
 impl Asked<'_> {
     /// The arm with what is known of it, and the logs with all notes about both.
-    fn read(&self, terminal: &output::Progress) -> Result<(ServoArm, ServoLogs), Failure> {
-        let arm = self.masses.arm(self.arm.0, self.arm.1)?;
-        terminal.say("reading logs");
-        let mut read = ServoLogs::read(self.logs.0, self.logs.1, self.arm.0)?;
-        read.warnings.splice(0..0, self.masses.note(self.arm.1));
-        Ok((arm, read))
+    fn read(&self, progress: logs::Progress<'_>) -> Result<ServoInput, Failure> {
+        let (arm, file) = self.arm;
+        let values = self.masses.values.as_ref().map(|path| Values::read(path)).transpose();
+        let values = values.map_err(|e| Failure::Unusable(e.to_string()))?;
+        Ok(ServoInput::read(arm, (values, Some(file)), self.logs, progress)?)
     }
 
     /// Writes the files of a result, prints it around its own lines, and judges whether it should be used.
@@ -147,8 +73,8 @@ pub(super) fn identify(
     verbosity: Verbosity,
 ) -> Result<(), Failure> {
     let say = |what: &str| terminal.say(what);
-    let (arm, read) = asked.read(terminal)?;
-    let mut found = identify_servos(&arm, &read.fit, &read.validate, logs::Progress::to(&say))?;
+    let read = asked.read(logs::Progress::to(&say))?;
+    let mut found = identify_servos(&read.arm, &read.fit, &read.validate, logs::Progress::to(&say))?;
     found.warnings.splice(0..0, read.warnings);
     let files = report::servos::files(&found).map_err(Failure::Refused)?;
     asked.finish(&files, (&found.unusable, &found.warnings), || in_words(&found), verbosity)
@@ -183,9 +109,9 @@ pub(super) fn explain(
     verbosity: Verbosity,
 ) -> Result<(), Failure> {
     let say = |what: &str| terminal.say(what);
-    let (arm, read) = asked.read(terminal)?;
     let progress = logs::Progress::to(&say);
-    let mut found = explain_servos(&arm, &read.fit, &read.validate, &Rule::default(), progress)?;
+    let read = asked.read(progress)?;
+    let mut found = explain_servos(&read.arm, &read.fit, &read.validate, &Rule::default(), progress)?;
     found.warnings.splice(0..0, read.warnings);
     let files = report::servos::explained(&found).map_err(Failure::Refused)?;
     asked.finish(&files, (&found.unusable, &found.warnings), || explained_in_words(&found), verbosity)
