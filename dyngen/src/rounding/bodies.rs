@@ -9,12 +9,9 @@
 //! * (B⁻¹)ᵢᵢ is the largest q̇ᵢ² with q̇ᵀBq̇ = 1. A joint's velocity is the difference of those of two links
 //!   about its axis z, and ω of a body with inertia I about its centre has (z·ω)² ≤ zᵀI⁻¹z times ωᵀIω. The
 //!   sum of both links' zᵀI⁻¹z is bᵢ ≥ (B⁻¹)ᵢᵢ.
-//! * Everything else by the inequality of Cauchy and Schwarz: |(B⁻¹)ᵢⱼ|² ≤ bᵢbⱼ, |Lₖⱼ|² ≤ Bⱼⱼ/dₖ, and column
-//!   k of L⁻¹ is how joints without torque move if joint k does with 1: twice the energy is dₖ, so |L⁻¹ⱼₖ|² ≤
-//!   bⱼdₖ.
+//! * Everything else follows from these ([`Factors::of_energy`]).
 
-use super::factors::{Factors, MassMatrix};
-use super::interval::Interval;
+use super::factors::{Factors, PosedMatrix, ROUNDED};
 use crate::arm::{Arm, Convention, Joint, JointKind, Parameter, ParameterKind};
 use crate::consistency::pseudo_inertia;
 use crate::exact::rational::to_f64;
@@ -50,7 +47,7 @@ pub(super) fn factors(
     arm: &Arm,
     set: &ParameterSet,
     values: &[f64],
-    mass: &MassMatrix,
+    mass: &PosedMatrix,
 ) -> Result<Factors, String> {
     if let Some(i) = arm.joints.iter().position(|joint| joint.rotor_ratio.is_some()) {
         return Err(format!("joint {} has a rotor", i + 1));
@@ -67,8 +64,8 @@ pub(super) fn factors(
     of_bodies(arm, &bodies, mass).ok_or_else(|| "rounded parameters may change B by too much".to_string())
 }
 
-fn of_bodies(arm: &Arm, bodies: &[Body], mass: &MassMatrix) -> Option<Factors> {
-    let most = mass.largest_diagonal(HALVINGS)?;
+fn of_bodies(arm: &Arm, bodies: &[Body], mass: &PosedMatrix) -> Option<Factors> {
+    let most = mass.largest_diagonal()?;
     let n = most.len();
     let (mut least, mut velocity) = (vec![0.0; n], vec![0.0; n]);
     for (i, joint) in arm.joints.iter().enumerate() {
@@ -88,43 +85,11 @@ fn of_bodies(arm: &Arm, bodies: &[Body], mass: &MassMatrix) -> Option<Factors> {
     }
     least.iter_mut().for_each(|x| *x *= 1.0 - share);
     velocity.iter_mut().for_each(|x| *x /= 1.0 - share);
-    let is_size = |x: &f64| x.is_finite() && *x > 0.0;
-    if ![&least, &velocity, &most].iter().all(|all| all.iter().all(is_size)) {
-        return None;
-    }
-    let root = |x: f64| Interval::within(x.sqrt() * ROUNDED);
-    let mut found = Factors {
-        n,
-        inverse: vec![Interval::point(0.0); n * n],
-        lower: vec![Interval::point(0.0); n * n],
-        lower_inverse: vec![Interval::point(0.0); n * n],
-        pivots: (0..n).map(|i| Interval { low: least[i] / ROUNDED, high: most[i] * ROUNDED }).collect(),
-        diagonal: Some(most.iter().map(|x| x * ROUNDED).collect()),
-    };
-    for i in 0..n {
-        for j in 0..n {
-            let at = i * n + j;
-            found.inverse[at] = root(velocity[i] * velocity[j]);
-            if j < i {
-                found.lower[at] = root(most[j] / least[i]);
-                found.lower_inverse[at] = root(velocity[i] * most[j]);
-            }
-        }
-        let at = i * n + i;
-        found.inverse[at].low = 1.0 / (most[i] * ROUNDED);
-        (found.lower[at], found.lower_inverse[at]) = (Interval::point(1.0), Interval::point(1.0));
-    }
-    Some(found)
+    Factors::of_energy(&least, &velocity, &most)
 }
-
-/// Halvings of the poses for each entry of B's diagonal.
-const HALVINGS: usize = 400;
 
 /// The share of B by which rounded parameters may move it.
 const MOVED: f64 = 0.5;
-
-/// More than what these sums and products of doubles round.
-const ROUNDED: f64 = 1.0 + 1e-9;
 
 /// Of the smallest eigenvalue of a pseudo-inertia, relative to the largest: below that a body has no volume.
 const THIN: f64 = 1e-9;

@@ -1,4 +1,4 @@
-//! Bounds of functions that divide by pivots of B: exact values and what the emitted ones are off by, kept
+//! Bounds of functions that divide by pivots of B or of Λ⁻¹: exact values and what the emitted ones are off by, kept
 //! apart.
 //!
 //! What is known of a solve (`known.rs`) holds for exact values alone. So each operation has the range of its
@@ -24,7 +24,7 @@ impl Program {
         values.clear();
         errors.clear();
         deviations.clear();
-        let mut running = solves.as_ref().map(Solves::start);
+        let mut running: Vec<_> = solves.iter().map(Solves::start).collect();
         for (k, operation) in self.operations.iter().enumerate() {
             let (value, from_operands) = self.exact(*operation, ranges, values, deviations)?;
             let mut error = match *operation {
@@ -57,11 +57,13 @@ impl Program {
             }
             values.push(value);
             deviations.push(deviation);
-            if let (Some(solves), Some(running)) = (solves, &mut running)
-                && k < self.emitted
-            {
+            for (solves, running) in solves.iter().zip(&mut running).filter(|_| k < self.emitted) {
                 let so_far = SoFar { operations: &self.operations, values, deviations, errors };
                 (values[k], deviations[k]) = solves.take(running, so_far);
+            }
+            // No pose of these is one where the ranges hold.
+            if values[k].low > values[k].high {
+                return Some(EXACT);
             }
             if values[k].magnitude() + deviations[k][0] >= f64::from(f32::MAX) {
                 deviations[k][0] = f64::INFINITY;
