@@ -27,18 +27,16 @@ impl Program {
         let mut running: Vec<_> = solves.iter().map(Solves::start).collect();
         for (k, operation) in self.operations.iter().enumerate() {
             let (value, from_operands) = self.exact(*operation, ranges, values, deviations)?;
-            let mut error = match *operation {
-                Operation::Constant(_, errors) => errors,
-                Operation::Variable(_) => EXACT,
-                Operation::Sine(index) => self.angles[index].1.turned(true, ranges)?.1,
-                Operation::Cosine(index) => self.angles[index].1.turned(false, ranges)?.1,
-                Operation::Mul(a, b) if self.is_power_of_two(a) || self.is_power_of_two(b) => TINY,
-                _ => rounds(value, from_operands),
+            let error = |value: Interval| match *operation {
+                _ if self.rounds_nothing(k) => Some(EXACT),
+                Operation::Constant(_, errors) => Some(errors),
+                Operation::Variable(_) => Some(EXACT),
+                Operation::Sine(index) => Some(self.angles[index].1.turned(true, ranges)?.1),
+                Operation::Cosine(index) => Some(self.angles[index].1.turned(false, ranges)?.1),
+                Operation::Mul(a, b) if self.is_power_of_two(a) || self.is_power_of_two(b) => Some(TINY),
+                _ => Some(rounds(value, from_operands)),
             };
-            if self.rounds_nothing(k) {
-                error = EXACT;
-            }
-            errors.push(error);
+            errors.push(error(value)?);
             let mut value = value.widened(0.0);
             if let Some(norm) = &self.norms[k] {
                 value = value.clamped(norm.bound(values, errors));
@@ -51,6 +49,9 @@ impl Program {
                     value.clamped(most * (1.0 + 1e-12))
                 }
             };
+            // What is known of the exact value bounds what it rounds as well.
+            errors[k] = error(value)?;
+            let error = errors[k];
             let deviation = [0, 1].map(|p| no_number_is_infinite((from_operands[p] + error[p]) * GROWN));
             if value.magnitude().is_nan() {
                 return None;

@@ -6,21 +6,61 @@
 //! least (B⁻¹)ᵢᵢ, so that xᵢ² ≤ bᵢ·xᵀBx. With η = Σ √(bᵢbⱼ)·|ΔBᵢⱼ| then |xᵀΔB·x| ≤ η·xᵀBx, that is,
 //! K(B + ΔB)Kᵀ = 1 + E with |Eᵢⱼ| ≤ η, and the factors of 1 + E are 1 within N = η/(1 − nη), as in
 //! `factors.rs`. The solves add residuals: e of Lᵀy = r + e counts √bᵢ·eᵢ, one of L·x = z counts √dᵢ·eᵢ.
-//! ρ is their sum, and R = Σ √bⱼ·|rⱼ| is at least √(xᵀBx). Which operation is which number of the solve is
-//! recognised in `recognise.rs`.
+//! ρ is their sum, and R = Σ √bⱼ·|rⱼ| is at least √(xᵀBx).
+//!
+//! An operation is taken for one of a solve where it has that one's value at a random point of the prime
+//! field, and where it keeps the equation of the solve when factors and results before it are replaced by
+//! random numbers.
 
 use super::factors::Factors;
 use super::interval::Interval;
 use super::precision::PRECISIONS;
 use super::program::{Errors, Operation};
-use super::recognise::{self, Exact, Right, Role};
-use crate::exact::prime::Fp;
+use crate::exact::prime::{Draws, Fp};
+use rustc_hash::FxHashMap;
+
+/// What an operation is in a solve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Role {
+    Pivot(usize),
+    /// 1/d
+    OfPivot(usize),
+    /// dₖ·Lₖⱼ, before it is divided.
+    Scaled(usize, usize),
+    Lower(usize, usize),
+    /// An entry of y of a solve.
+    Right(usize, usize),
+    /// y·(1/d)
+    Half(usize, usize),
+    Solution(usize, usize),
+}
+
+/// The values of a factorisation and of its solves at a random point of the prime field.
+#[derive(Clone, Debug)]
+pub(super) struct Exact {
+    pub(super) n: usize,
+    pub(super) b: Vec<Fp>,
+    pub(super) lower: Vec<Fp>,
+    pub(super) pivots: Vec<Fp>,
+    /// x of each solve.
+    pub(super) solutions: Vec<Vec<Fp>>,
+}
+
+/// An entry of a right-hand side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Right {
+    Zero,
+    /// The value of this operation.
+    At(usize),
+    /// No operation has its value: it is mixed with what is subtracted from it.
+    Mixed,
+}
 
 /// The solves of a program.
 #[derive(Clone, Debug)]
 pub(super) struct Solves {
     /// By emitted operation.
-    roles: Vec<Vec<Role>>,
+    roles: Vec<Option<Role>>,
     /// By emitted operation with a role those between it and other roles, in order.
     between: Vec<Vec<usize>>,
     /// By emitted operation the solves and entries of which it is the right-hand side.
@@ -63,16 +103,18 @@ impl Solves {
         values: &[Fp],
     ) -> Option<Solves> {
         let (diagonal, n) = (ranges.diagonal.clone()?, exact.n);
-        let (roles, rights) = recognise::roles(exact, operations, values);
+        let mut found = Recognised::new(exact, operations, values);
+        found.replace(&[]);
+        let rights: Vec<Vec<Right>> = (0..exact.solutions.len()).map(|s| found.solve(s)).collect();
         let mut given = vec![Vec::new(); operations.len()];
         for (s, i) in (0..rights.len()).flat_map(|s| (0..n).map(move |i| (s, i))) {
             if let Right::At(k) = rights[s][i] {
                 given[k].push((s, i));
             }
         }
-        let between = between(operations, &roles, |k| given[k].iter().any(|(_, i)| i + 1 == n));
+        let between = between(operations, &found.roles, |k| given[k].iter().any(|(_, i)| i + 1 == n));
         Some(Solves {
-            roles,
+            roles: found.roles,
             between,
             given,
             rights,
@@ -98,7 +140,7 @@ impl Solves {
         for (s, i) in &self.given[k] {
             running.rights[*s][*i] = value.magnitude();
         }
-        for role in self.roles[k].iter().copied() {
+        if let Some(role) = self.roles[k] {
             if let Role::Right(s, i) = role
                 && self.rights[s][i] == Right::Mixed
             {
@@ -148,7 +190,7 @@ impl Solves {
         let mut found: Vec<Interval> = Vec::with_capacity(between.len() + 1);
         for op in between.iter().chain([&k]) {
             let of = |a: usize| match between.binary_search(&a) {
-                _ if self.roles[a].iter().any(|role| matches!(role, Role::Lower(..))) => Interval::point(0.0),
+                _ if matches!(self.roles[a], Some(Role::Lower(..))) => Interval::point(0.0),
                 Ok(at) => found[at],
                 Err(_) => so_far.values[a],
             };
@@ -189,18 +231,20 @@ impl Solves {
         all: &[Errors],
         p: usize,
     ) -> f64 {
-        if let Role::Right(s, i) = role
-            && self.rights[s][i] == Right::At(a)
-        {
-            return all[a][p];
-        }
-        let solve = role.solve();
+        let solve = match role {
+            Role::Right(s, i) if self.rights[s][i] == Right::At(a) => return all[a][p],
+            Role::Right(s, _) | Role::Half(s, _) | Role::Solution(s, _) => Some(s),
+            _ => None,
+        };
         // The last entry of y may be a part of other entries of a right-hand side: there it is not times L.
         let is_y = |s: usize| self.given[a].iter().any(|(t, i)| *t == s && i + 1 == self.pivots.len());
-        let is_factor = |role: &Role| matches!(role, Role::Lower(..) | Role::OfPivot(_));
-        let times_factor = with.is_some_and(|b| self.roles[b].iter().any(is_factor));
-        let is_taken = |role: &Role| role.solve().is_none() || role.solve() == solve;
-        let is_exact = self.roles[a].iter().any(is_taken) || (times_factor && solve.is_some_and(is_y));
+        let by_factor = with.and_then(|b| self.roles[b]);
+        let times_factor = matches!(by_factor, Some(Role::Lower(..) | Role::OfPivot(_)));
+        let is_exact = match self.roles[a] {
+            Some(Role::Pivot(_) | Role::OfPivot(_) | Role::Scaled(..) | Role::Lower(..)) => true,
+            Some(Role::Right(t, _) | Role::Half(t, _) | Role::Solution(t, _)) if solve == Some(t) => true,
+            _ => times_factor && solve.is_some_and(is_y),
+        };
         match between.binary_search(&a) {
             _ if is_exact => 0.0,
             Ok(at) => found[at],
@@ -289,15 +333,19 @@ impl Solves {
 
 /// By operation with a role those between it and other roles, in order: what reads a role, or `is_y`, and has
 /// none.
-fn between(operations: &[Operation], roles: &[Vec<Role>], is_y: impl Fn(usize) -> bool) -> Vec<Vec<usize>> {
+fn between(
+    operations: &[Operation],
+    roles: &[Option<Role>],
+    is_y: impl Fn(usize) -> bool,
+) -> Vec<Vec<usize>> {
     let operands = |k: usize| match operations[k] {
         Operation::Add(a, b, _) | Operation::Mul(a, b) | Operation::Div(a, b) => vec![a, b],
         _ => Vec::new(),
     };
     let mut is_between = vec![false; operations.len()];
     for k in 0..operations.len() {
-        let reads = |a: &usize| !roles[*a].is_empty() || is_y(*a) || is_between[*a];
-        is_between[k] = roles[k].is_empty() && operands(k).iter().any(reads);
+        let reads = |a: &usize| roles[*a].is_some() || is_y(*a) || is_between[*a];
+        is_between[k] = roles[k].is_none() && operands(k).iter().any(reads);
     }
     let of = |k: usize| {
         let (mut found, mut open) = (Vec::new(), operands(k));
@@ -310,7 +358,7 @@ fn between(operations: &[Operation], roles: &[Vec<Role>], is_y: impl Fn(usize) -
         found.sort_unstable();
         found
     };
-    (0..operations.len()).map(|k| if roles[k].is_empty() { Vec::new() } else { of(k) }).collect()
+    (0..operations.len()).map(|k| if roles[k].is_some() { of(k) } else { Vec::new() }).collect()
 }
 
 /// More than a product with a rounded reciprocal is off, as a share of itself.
@@ -326,6 +374,189 @@ const GROWN: f64 = 1.0 + 1e-9;
 /// Nothing is known of ∞·0.
 fn infinite(x: f64) -> f64 {
     if x.is_nan() { f64::INFINITY } else { x }
+}
+
+/// What stands for a value.
+struct Stand {
+    /// `None` for a right-hand side alone.
+    role: Option<Role>,
+    /// What its operands must give; `None` for a right-hand side, however it is computed.
+    side: Option<Fp>,
+    number: Fp,
+}
+
+/// Operations with their roles, and the random numbers that stand for those.
+struct Recognised<'a> {
+    exact: &'a Exact,
+    operations: &'a [Operation],
+    values: &'a [Fp],
+    roles: Vec<Option<Role>>,
+    of_role: FxHashMap<Role, usize>,
+    /// By value.
+    factors: FxHashMap<u64, Stand>,
+    /// L and D of random numbers.
+    lower: Vec<Fp>,
+    pivots: Vec<Fp>,
+    draws: Draws,
+}
+
+impl<'a> Recognised<'a> {
+    fn new(exact: &'a Exact, operations: &'a [Operation], values: &'a [Fp]) -> Self {
+        let mut draws = Draws::new(0x656e_6572_6779);
+        let n = exact.n;
+        let number = |l: &Fp| if *l == Fp::ZERO { Fp::ZERO } else { draws.element() };
+        let lower: Vec<Fp> = exact.lower.iter().map(number).collect();
+        let mut pivots: Vec<Fp> = (0..n).map(|_| draws.element()).collect();
+        let mut factors = FxHashMap::default();
+        let inverse = |x: Fp| x.inverse().unwrap_or(Fp::ZERO);
+        let mut scaled: Vec<Fp> = (0..n * n).map(|_| draws.element()).collect();
+        // The last row is that of B, whose entries may be parts of others: nothing stands for them.
+        let last = n - 1;
+        pivots[last] = exact.pivots[last];
+        (0..last).for_each(|j| scaled[last * n + j] = exact.b[last * n + j]);
+        for i in (0..n).rev() {
+            scaled[i * n + i] = pivots[i];
+            let eliminated = |j: usize| {
+                let term = |k: usize| lower[k * n + i] * scaled[k * n + j];
+                (i + 1..n).fold(exact.b[i * n + j], |sum, k| sum - term(k))
+            };
+            let (d, of_pivot) = (exact.pivots[i], inverse(pivots[i]));
+            if i < last {
+                stand(&mut factors, d, Some(Role::Pivot(i)), Some(eliminated(i)), pivots[i]);
+            }
+            stand(&mut factors, inverse(d), Some(Role::OfPivot(i)), Some(of_pivot), of_pivot);
+            for j in 0..i {
+                let (l, s) = (exact.lower[i * n + j], scaled[i * n + j]);
+                if i < last {
+                    stand(&mut factors, l * d, Some(Role::Scaled(i, j)), Some(eliminated(j)), s);
+                }
+                stand(&mut factors, l, Some(Role::Lower(i, j)), Some(s * of_pivot), lower[i * n + j]);
+            }
+        }
+        let (roles, of_role) = (vec![None; operations.len()], FxHashMap::default());
+        Recognised { exact, operations, values, roles, of_role, factors, lower, pivots, draws }
+    }
+
+    /// Evaluates all operations with the numbers in the place of those that they stand for, and gives these
+    /// their roles; `more` goes behind the factors.
+    fn replace(&mut self, more: &[FxHashMap<u64, Stand>]) {
+        let mut replaced: Vec<Fp> = Vec::with_capacity(self.values.len());
+        for (k, operation) in self.operations.iter().enumerate() {
+            let value = self.values[k];
+            let by_operands = match *operation {
+                Operation::Add(a, b, true) => replaced[a] - replaced[b],
+                Operation::Add(a, b, false) => replaced[a] + replaced[b],
+                Operation::Mul(a, b) => replaced[a] * replaced[b],
+                Operation::Div(a, b) => replaced[b].inverse().map_or(value, |x| replaced[a] * x),
+                _ => value,
+            };
+            let mut maps = std::iter::once(&self.factors).chain(more);
+            let found = maps.find_map(|map| {
+                let plus = map.get(&value.residue()).map(|stand| (stand, false));
+                plus.or_else(|| Some((map.get(&(-value).residue())?, true)))
+            });
+            let turned = |x: Fp, negative: bool| if negative { -x } else { x };
+            let (mut number, mut own) = (by_operands, None);
+            if let Some((stand, negative)) = found {
+                let holds = stand.side.is_none_or(|side| by_operands == turned(side, negative));
+                let free = |role: Role| {
+                    let first = self.of_role.get(&role).is_none_or(|at| *at == k);
+                    first && self.may_be(k, *operation, role)
+                };
+                if holds && stand.role.is_none_or(free) {
+                    (number, own) = (turned(stand.number, negative), stand.role);
+                }
+            }
+            if let Some(role) = own
+                && self.roles[k].is_none()
+            {
+                self.roles[k] = Some(role);
+                self.of_role.insert(role, k);
+            }
+            replaced.push(number);
+        }
+    }
+
+    /// A quotient is one where it is the rounded product with a rounded reciprocal.
+    fn may_be(&self, k: usize, operation: Operation, role: Role) -> bool {
+        let of = |a: usize| self.roles[a];
+        match (role, operation) {
+            (Role::OfPivot(_), Operation::Div(one, _)) => self.values[one] == Fp::ONE,
+            (Role::Lower(i, _) | Role::Half(_, i), Operation::Mul(a, b)) => {
+                of(a) == Some(Role::OfPivot(i)) || of(b) == Some(Role::OfPivot(i))
+            }
+            (Role::OfPivot(_) | Role::Lower(..) | Role::Half(..), _) => false,
+            // What is given, or the same number of another role, is computed from nothing.
+            _ => self.roles[k].is_none_or(|known| known == role),
+        }
+    }
+
+    /// Gives the operations of a solve their roles; returns the right-hand side.
+    fn solve(&mut self, s: usize) -> Vec<Right> {
+        let Exact { n, b, lower, pivots, solutions } = self.exact;
+        let n = *n;
+        let x = &solutions[s];
+        let sum = |of: &dyn Fn(usize) -> Fp, range: std::ops::Range<usize>| {
+            range.fold(Fp::ZERO, |sum, j| sum + of(j))
+        };
+        let right: Vec<Fp> = (0..n).map(|i| sum(&|j| b[i * n + j] * x[j], 0..n)).collect();
+        let half: Vec<Fp> = (0..n).map(|i| sum(&|j| lower[i * n + j] * x[j], 0..i + 1)).collect();
+        let mut map = FxHashMap::default();
+        // What stands for y, z and x.
+        let mut numbers = [vec![Fp::ZERO; n], vec![Fp::ZERO; n], vec![Fp::ZERO; n]];
+        for i in (0..n).rev() {
+            let term = |k: usize| self.lower[k * n + i] * numbers[0][k];
+            let side = right[i] - sum(&term, i + 1..n);
+            numbers[0][i] = self.number(half[i] * pivots[i], side);
+            // The last one is the right-hand side, however that is computed.
+            let (role, side) = ((i + 1 < n).then_some(Role::Right(s, i)), (i + 1 < n).then_some(side));
+            stand(&mut map, half[i] * pivots[i], role, side, numbers[0][i]);
+        }
+        for i in 0..n {
+            let side = numbers[0][i] * self.pivots[i].inverse().unwrap_or(Fp::ZERO);
+            numbers[1][i] = side;
+            stand(&mut map, half[i], Some(Role::Half(s, i)), Some(side), side);
+        }
+        for i in 0..n {
+            let term = |k: usize| self.lower[i * n + k] * numbers[2][k];
+            let side = numbers[1][i] - sum(&term, 0..i);
+            numbers[2][i] = if x[i] == half[i] { side } else { self.number(x[i], side) };
+            stand(&mut map, x[i], Some(Role::Solution(s, i)), Some(side), numbers[2][i]);
+        }
+        // However they are computed.
+        let mut given = FxHashMap::default();
+        for r in &right[..n - 1] {
+            stand(&mut given, *r, None, None, *r);
+        }
+        self.replace(&[map, given]);
+        let place = |r: &Fp| match self.values.iter().position(|v| *v == *r || -*v == *r) {
+            _ if *r == Fp::ZERO => Right::Zero,
+            Some(k) => Right::At(k),
+            None => Right::Mixed,
+        };
+        right.iter().map(place).collect()
+    }
+
+    /// What stands for a result: the number of a factor of the same value, or a random one.
+    fn number(&mut self, value: Fp, side: Fp) -> Fp {
+        if value == Fp::ZERO {
+            return Fp::ZERO;
+        }
+        let of = |v: Fp| self.factors.get(&v.residue()).map(|stand| stand.number);
+        let known = of(value).or_else(|| of(-value).map(|x| -x));
+        match known {
+            Some(number) if number == side => number,
+            // What is given.
+            _ if value == side => value,
+            _ => self.draws.element(),
+        }
+    }
+}
+
+fn stand(map: &mut FxHashMap<u64, Stand>, value: Fp, role: Option<Role>, side: Option<Fp>, number: Fp) {
+    if value != Fp::ZERO {
+        map.entry(value.residue()).or_insert(Stand { role, side, number });
+    }
 }
 
 #[cfg(test)]

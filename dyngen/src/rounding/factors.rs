@@ -360,13 +360,6 @@ impl Factors {
         Some(found)
     }
 
-    /// The ranges where a positive semidefinite matrix is added to B, with which B's diagonal is at most
-    /// `most`: pivots and xᵀBx only grow.
-    pub(super) fn with_added(&self, most: &[f64]) -> Option<Factors> {
-        let least: Vec<f64> = self.pivots.iter().map(|d| d.low).collect();
-        Factors::of_energy(&least, &self.mobility(), most)
-    }
-
     /// At least the entries of the diagonal of B⁻¹.
     pub(super) fn mobility(&self) -> Vec<f64> {
         (0..self.n).map(|i| self.inverse[i * self.n + i].high).collect()

@@ -6,11 +6,10 @@
 //! chance below 2⁻⁵⁴, as in `prove/`). The same holds for derivatives of the result by each of the
 //! operations.
 
-use super::energy::Solves;
+use super::energy::{Exact, Solves};
 use super::factors::Factors;
 use super::interval::Interval;
 use super::program::Operation;
-use super::recognise::Exact;
 use crate::dynamics::{Function, FunctionGraph};
 use crate::exact::prime::{Draws, Fp};
 use crate::model::Model;
@@ -101,6 +100,7 @@ impl<'a> Facts<'a> {
         let mut facts =
             Facts { facts: FxHashMap::default(), nodes: point.nodes(set, built)?, solves: Vec::new() };
         facts.of_factors(&solve);
+        facts.of_eliminated(&solve);
         let solutions = match built.function {
             Function::MassMatrixInverse => columns(&solve.inverse, n),
             Function::ForwardDynamics | Function::ForwardDynamicsWithPayload => {
@@ -161,6 +161,25 @@ impl<'a> Facts<'a> {
         }
     }
 
+    /// Entries of B, and what is subtracted from them and left of them on the way to L and D, where B's diagonal
+    /// has a bound: what is left is positive definite, and each Lₖᵢ·dₖ·Lₖⱼ is an entry of a positive
+    /// semidefinite matrix, both at most B.
+    fn of_eliminated(&mut self, solve: &Solve<'_>) {
+        let (n, ranges) = (solve.n, solve.ranges);
+        let Some(diagonal) = &ranges.diagonal else { return };
+        for (i, j) in (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+            let range = Interval::within((diagonal[i] * diagonal[j]).sqrt() * ROUNDED);
+            let mut left = solve.b[i * n + j];
+            self.range(left, range);
+            for k in (i + 1..n).rev() {
+                let product = solve.lower[k * n + i] * solve.pivots[k] * solve.lower[k * n + j];
+                left = left - product;
+                self.range(product, range);
+                self.range(left, range);
+            }
+        }
+    }
+
     /// Products of two matrices with what is between them replaced by an entry of a symmetric matrix and its
     /// mirror: derivatives of an inverse X by what is left of its matrix are −X·∂S·X.
     fn of_products(&mut self, left: &Ranged, right: &Ranged) {
@@ -184,6 +203,7 @@ impl<'a> Facts<'a> {
     /// of J̄ has J̄ᵀBJ̄ = Λ, so |J̄ᵢⱼ|² ≤ (B⁻¹)ᵢᵢ·Λⱼⱼ.
     fn of_task(&mut self, mass: &Solve<'_>, task: &Solve<'_>, consistent: Vec<Fp>) {
         self.of_factors(task);
+        self.of_eliminated(task);
         let (of_mass, of_task) = (mass.ranges.mobility(), task.ranges.mobility());
         let most = |k: usize| (of_mass[k / task.n] * of_task[k % task.n]).sqrt() * ROUNDED;
         let entries = consistent.into_iter().enumerate().map(|(k, x)| (x, Interval::within(most(k))));

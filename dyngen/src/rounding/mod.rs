@@ -20,9 +20,9 @@ mod interval;
 mod known;
 mod limits;
 mod norms;
+mod payload;
 mod precision;
 mod program;
-mod recognise;
 mod search;
 mod slopes;
 mod task;
@@ -178,32 +178,38 @@ impl<'a> Bounder<'a> {
         self.factors.get_or_init(|| self.factors(limits)).as_ref().map_err(Clone::clone)
     }
 
-    /// A payload that a body can have only adds energy.
     fn loaded(&self, limits: &Limits<'_>) -> Result<&Factors, String> {
         let loaded = || {
-            let mass = self.mass_matrix(Function::MassMatrixWithPayload, limits)?;
-            let most = mass.largest_diagonal().ok_or("an angle is too large")?;
-            self.unloaded(limits)?.with_added(&most).ok_or_else(|| "B(q) has no bound".to_string())
+            let most = self.matrix(Function::MassMatrix, limits)?.largest_diagonal();
+            let most = most.ok_or("B(q) has no bound")?;
+            payload::factors(self.unloaded(limits)?, &most, &self.jacobian(limits)?)
+                .ok_or_else(|| "B(q) has no bound".to_string())
         };
         self.loaded.get_or_init(loaded).as_ref().map_err(Clone::clone)
     }
 
     fn task(&self, limits: &Limits<'_>) -> Result<&Task, String> {
         let task = || {
-            let factors = self.unloaded(limits)?;
-            Task::new(self.model, self.parameters.ok_or(ANY)?, limits, factors)
+            let values = self.parameters.ok_or(ANY)?;
+            Task::new(self.model, values, &self.jacobian(limits)?, self.unloaded(limits)?)
         };
         self.task.get_or_init(task).as_ref().map_err(Clone::clone)
     }
 
-    fn mass_matrix(&self, function: Function, limits: &Limits<'_>) -> Result<PosedMatrix, String> {
+    /// The largest sizes of J's entries.
+    fn jacobian(&self, limits: &Limits<'_>) -> Result<Vec<f64>, String> {
+        let sizes = self.matrix(Function::Jacobian, limits)?.largest_sizes();
+        sizes.ok_or_else(|| "the Jacobian has no bound".to_string())
+    }
+
+    fn matrix(&self, function: Function, limits: &Limits<'_>) -> Result<PosedMatrix, String> {
         let built = self.model.function(function, SetKind::Minimal).map_err(|e| e.to_string())?;
         PosedMatrix::new(self.model, &built, limits).ok_or_else(|| "a parameter has no value".to_string())
     }
 
     fn factors(&self, limits: &Limits<'_>) -> Result<Factors, String> {
         let Bounder { model, parameters: Some(values), .. } = *self else { return Err(ANY.to_string()) };
-        let mass = self.mass_matrix(Function::MassMatrix, limits)?;
+        let mass = self.matrix(Function::MassMatrix, limits)?;
         if let Some(rough) = mass.factors(ROUGH, BOXES) {
             return Ok(mass.factors(FINE, BOXES).unwrap_or(rough));
         }

@@ -5,8 +5,7 @@
 //! needs: (A⁻¹)ᵢᵢ ≤ lᵢ, and a pivot of A is at least 1/Λᵢᵢ, since xᵀAx ≥ xᵢ²/Λᵢᵢ (Cauchy and Schwarz).
 
 use super::Where;
-use super::factors::{Factors, PosedMatrix, ROUNDED};
-use super::limits::Limits;
+use super::factors::{Factors, ROUNDED};
 use crate::consistency;
 use crate::dynamics::Function;
 use crate::evaluator::Evaluator;
@@ -25,20 +24,17 @@ pub(super) struct Task {
 const N: usize = 6;
 
 impl Task {
-    /// For values of the minimal set and the ranges for B.
+    /// For values of the minimal set, the largest sizes of J's entries, and the ranges for B.
     ///
     /// # Errors
     /// Why there is none, in words.
     pub(super) fn new(
         model: &Model,
         values: &[f64],
-        limits: &Limits<'_>,
+        jacobian: &[f64],
         mass: &Factors,
     ) -> Result<Task, String> {
         let poses = poses(model, values)?;
-        let built = model.function(Function::Jacobian, SetKind::Minimal).map_err(|e| e.to_string())?;
-        let jacobian = PosedMatrix::new(model, &built, limits).and_then(|matrix| matrix.largest_sizes());
-        let jacobian = jacobian.ok_or("the Jacobian has no bound")?;
         let n = mass.n;
         // Of rows: |Jᵢ|·|B⁻¹|·|Jᵢ|ᵀ.
         let most = jacobian.chunks(n).map(|row| {
@@ -46,12 +42,14 @@ impl Task {
             (0..n * n).map(term).sum::<f64>() * ROUNDED
         });
         let least: Vec<f64> = poses.largest_inertia.iter().map(|l| 1.0 / l).collect();
-        let factors = Factors::of_energy(&least, &poses.largest_inertia, &most.collect::<Vec<_>>());
+        let most: Vec<f64> = most.collect();
+        let factors = Factors::of_energy(&least, &poses.largest_inertia, &most);
         Ok(Task { factors: factors.ok_or("Λ is not positive definite")?, poses })
     }
 }
 
-/// The limits that each entry of Λ's diagonal keeps at [`SHARE`] of poses that are drawn at random.
+/// Limits that all six entries of Λ's diagonal keep at [`SHARE`] of poses that are drawn at random: one multiple
+/// of each entry's median.
 fn poses(model: &Model, values: &[f64]) -> Result<Where, String> {
     let inertia =
         Evaluator::new(model, Function::TaskInertia, SetKind::Minimal).map_err(|e| e.to_string())?;
@@ -62,15 +60,20 @@ fn poses(model: &Model, values: &[f64]) -> Result<Where, String> {
             std::array::from_fn(|i| or_infinite(flat[i * N + i]))
         })
         .collect();
-    let limit = |i: usize| {
-        let mut all: Vec<f64> = drawn.iter().map(|diagonal| diagonal[i]).collect();
-        all.sort_by(f64::total_cmp);
-        two_digits(all[(all.len() as f64 * SHARE) as usize])
-    };
-    let largest_inertia: Vec<f64> = (0..N).map(limit).collect();
+    let medians: [f64; N] = std::array::from_fn(|i| kept_by(drawn.iter().map(|x| x[i]).collect(), 0.5));
+    let multiple =
+        |x: &[f64; N]| x.iter().zip(&medians).fold(0.0, |most: f64, (x, median)| most.max(x / median));
+    let most = kept_by(drawn.iter().map(multiple).collect(), SHARE);
+    let largest_inertia: Vec<f64> = medians.iter().map(|median| two_digits(most * median)).collect();
     let within = |diagonal: &&[f64; N]| diagonal.iter().zip(&largest_inertia).all(|(x, l)| x <= l);
     let share = drawn.iter().filter(within).count() as f64 / drawn.len() as f64;
     Ok(Where { largest_inertia, share })
+}
+
+/// The number that a share of all is no larger than.
+fn kept_by(mut all: Vec<f64>, share: f64) -> f64 {
+    all.sort_by(f64::total_cmp);
+    all[(all.len() as f64 * share) as usize]
 }
 
 /// A Λ that is no number is none within limits.
@@ -85,5 +88,6 @@ fn two_digits(x: f64) -> f64 {
     format!("{}e{power}", (x / 10f64.powi(power)).ceil()).parse().unwrap_or(x)
 }
 
-/// The share of poses that keeps the limit of one entry of Λ's diagonal.
-const SHARE: f64 = 0.9;
+/// The share of poses for which Λ has a bound: where nine of ten do, the limits are five times as high, and
+/// bounds grow with their square.
+const SHARE: f64 = 0.5;
