@@ -88,7 +88,7 @@ fn describe_bounds_the_rounding_where_the_arm_has_limits() {
     // B is positive for these values: accelerations have a bound.
     let accelerations = of(&given, "forward_dynamics", "f32");
     assert!(accelerations.len() == 6 && accelerations.iter().all(|x| *x < 2e-3), "{accelerations:?}");
-    // Λ has bounds at poses where it is not too large, and in f64 alone: no bound is no number, with the reason.
+    // Λ has bounds where it is not too large, and in f64 alone: no bound is no number, with the reason.
     let all = given["rounding"].as_object().unwrap();
     let without = all.iter().filter(|(_, of)| of.get("why").is_some()).map(|(f, _)| f.as_str());
     let expected = ["task_inertia", "dynamically_consistent_inverse"];

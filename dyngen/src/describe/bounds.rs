@@ -18,7 +18,9 @@ impl ParameterRange {
     /// In words.
     pub fn text(self) -> &'static str {
         match self {
-            ParameterRange::Values => "the given values; e, f and the payload, a body's: each number within ±1",
+            ParameterRange::Values => {
+                "the given values; e, f and the payload, a body's: each number within ±1"
+            }
             ParameterRange::Unit => {
                 "each within ±1 SI unit, as no values are given; e, f and the payload, a body's: each number within ±1"
             }

@@ -9,10 +9,10 @@
 //! * (B⁻¹)ᵢᵢ is the largest q̇ᵢ² with q̇ᵀBq̇ = 1. A joint's velocity is the difference of those of two links
 //!   about its axis z, and ω of a body with inertia I about its centre has (z·ω)² ≤ zᵀI⁻¹z times ωᵀIω. The
 //!   sum of both links' zᵀI⁻¹z is bᵢ ≥ (B⁻¹)ᵢᵢ.
-//! * A rotor on the link before joint i turns with ω = z·ω of that link and k·q̇ᵢ more. Its energy ½Iₘ(ω + k·q̇ᵢ)²
-//!   has the part ½Iₘω² that the link's parameters hold: a link is the body that is left without the rotors on
-//!   it. A pivot gets Iₘk² more, as the links before are at rest; and by the difference of the rotor's velocity
-//!   and ω (B⁻¹)ᵢᵢ ≤ (1/Iₘ + zᵀI⁻¹z)/k² too.
+//! * A rotor on the link before joint i turns about z with that link's w = z·ω and k·q̇ᵢ more. Its energy is
+//!   ½Iₘ(w + k·q̇ᵢ)². The link's parameters hold the part ½Iₘw²: a body is a link without the rotor on it. A
+//!   pivot gets Iₘk² more, as the links before are at rest; and by the difference of w + k·q̇ᵢ and w
+//!   (B⁻¹)ᵢᵢ ≤ (1/Iₘ + zᵀI⁻¹z)/k² too.
 //! * Everything else follows from these ([`Factors::of_energy`]).
 
 use super::factors::{Factors, PosedMatrix, ROUNDED};

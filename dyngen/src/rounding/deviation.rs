@@ -1,5 +1,5 @@
-//! Bounds of functions that divide by pivots of B or of Λ⁻¹: exact values and what the emitted ones are off by, kept
-//! apart.
+//! Bounds of functions that divide by pivots of B or of Λ⁻¹: exact values and what the emitted ones are off
+//! by, kept apart.
 //!
 //! What is known of a solve (`known.rs`) holds for exact values alone. So each operation has the range of its
 //! exact value and, forwards from its operands, how far the emitted one may be off (running error analysis,

@@ -328,8 +328,8 @@ impl Factors {
         Factors { n, inverse, lower, lower_inverse, pivots: vec![nothing; n], diagonal: None }
     }
 
-    /// The ranges that follow from pivots of at least `least`, from bᵢ = `mobility` ≥ (B⁻¹)ᵢᵢ and from `most` ≥
-    /// Bᵢᵢ; `None` where one of these is not positive and finite.
+    /// The ranges that follow from pivots of at least `least`, from bᵢ = `mobility` ≥ (B⁻¹)ᵢᵢ and from `most`
+    /// ≥ Bᵢᵢ; `None` where one of these is not positive and finite.
     ///
     /// By the inequality of Cauchy and Schwarz |(B⁻¹)ᵢⱼ|² ≤ bᵢbⱼ and |Lₖⱼ|² ≤ Bⱼⱼ/dₖ. Column k of L⁻¹ is how
     /// joints without torque move if joint k does with 1: twice the energy is dₖ, so |L⁻¹ⱼₖ|² ≤ bⱼdₖ.

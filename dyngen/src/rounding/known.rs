@@ -82,8 +82,8 @@ impl Ranged {
 }
 
 impl<'a> Facts<'a> {
-    /// Facts from the ranges for B, and from those for Λ⁻¹ where the function divides by its pivots too. `None`
-    /// where the point is none of the function's, which chance excludes.
+    /// Facts from the ranges for B, and from those for Λ⁻¹ where the function divides by its pivots too.
+    /// `None` where the point is none of the function's, which chance excludes.
     pub(super) fn new(
         model: &Model,
         built: &FunctionGraph,
@@ -161,8 +161,8 @@ impl<'a> Facts<'a> {
         }
     }
 
-    /// Entries of B, and what is subtracted from them and left of them on the way to L and D, where B's diagonal
-    /// has a bound: what is left is positive definite, and each Lₖᵢ·dₖ·Lₖⱼ is an entry of a positive
+    /// Entries of B, and what is subtracted from them and left of them on the way to L and D, where B's
+    /// diagonal has a bound: what is left is positive definite, and each Lₖᵢ·dₖ·Lₖⱼ is an entry of a positive
     /// semidefinite matrix, both at most B.
     fn of_eliminated(&mut self, solve: &Solve<'_>) {
         let (n, ranges) = (solve.n, solve.ranges);
@@ -199,8 +199,8 @@ impl<'a> Facts<'a> {
         }
     }
 
-    /// Factors of Λ⁻¹, entries of Λ and of J̄, and their derivatives by what is left of Λ⁻¹ and of B. Column j
-    /// of J̄ has J̄ᵀBJ̄ = Λ, so |J̄ᵢⱼ|² ≤ (B⁻¹)ᵢᵢ·Λⱼⱼ.
+    /// Factors of Λ⁻¹, entries of Λ and of J̄, and their derivatives by what is left of Λ⁻¹ and of B. As
+    /// J̄ᵀBJ̄ = Λ, |J̄ᵢⱼ|² ≤ (B⁻¹)ᵢᵢ·Λⱼⱼ.
     fn of_task(&mut self, mass: &Solve<'_>, task: &Solve<'_>, consistent: Vec<Fp>) {
         self.of_factors(task);
         self.of_eliminated(task);

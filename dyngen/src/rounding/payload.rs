@@ -1,9 +1,9 @@
 //! Ranges of LᵀDL and of B⁻¹ with a payload that a body can have, each of its ten numbers within ±1.
 //!
-//! It only adds energy. So pivots are at least, and (B⁻¹)ᵢᵢ at most, those of the arm alone. Where joint i moves
-//! with 1, the tool's frame has velocities v and ω, and twice the payload's energy is m·v² + 2·v·(ω × m·c) +
-//! ωᵀIω. The mass m and each entry of m·c and of I are at most 1, so |m·c| ≤ √3, and the largest eigenvalue
-//! of a body's I is at most half its trace, 3/2.
+//! It only adds energy. So pivots are at least, and (B⁻¹)ᵢᵢ at most, those of the arm alone. Where joint i
+//! moves with 1, the tool's frame has velocities v and ω, and twice the payload's energy is m·v² + 2·v·(ω ×
+//! m·c) + ωᵀIω. The mass m and each entry of m·c and of I are at most 1, so |m·c| ≤ √3, and the largest
+//! eigenvalue of a body's I is at most half its trace, 3/2.
 
 use super::factors::{Factors, ROUNDED};
 

@@ -48,8 +48,8 @@ impl Task {
     }
 }
 
-/// Limits that all six entries of Λ's diagonal keep at [`SHARE`] of poses that are drawn at random: one multiple
-/// of each entry's median.
+/// Limits that all six entries of Λ's diagonal keep at [`SHARE`] of poses that are drawn at random: one
+/// multiple of each entry's median.
 fn poses(model: &Model, values: &[f64]) -> Result<Where, String> {
     let inertia =
         Evaluator::new(model, Function::TaskInertia, SetKind::Minimal).map_err(|e| e.to_string())?;
@@ -88,6 +88,5 @@ fn two_digits(x: f64) -> f64 {
     format!("{}e{power}", (x / 10f64.powi(power)).ceil()).parse().unwrap_or(x)
 }
 
-/// The share of poses for which Λ has a bound: where nine of ten do, the limits are five times as high, and
-/// bounds grow with their square.
+/// The share of poses for which Λ has a bound. With more of them limits grow, and bounds with their square.
 const SHARE: f64 = 0.5;

@@ -313,8 +313,8 @@ fn inverse_from(b: &SMatrix<f64, 6, 6>, first: usize) -> SMatrix<f64, 6, 6> {
     block.try_inverse().unwrap()
 }
 
-/// Entries of B⁻¹, L and D, with a payload too, and of Λ are in their ranges at poses of the whole range and of
-/// its corners.
+/// Entries of B⁻¹, L and D, with a payload too, and of Λ are in their ranges at poses of the whole range and
+/// of its corners.
 #[test]
 fn ranges_of_factors_hold_every_pose() {
     let (model, values) = lwa4p();
