@@ -57,7 +57,7 @@ pub fn check(model: &Model, kind: SetKind, values: &[f64]) -> Result<Possibility
     let set = model.set(kind)?;
     let mass = Evaluator::new(model, Function::MassMatrix, kind)?;
     let mut reasons = impossible_links(arm, set, values);
-    let search = Search { matrix: &mass, values, rows: arm.dof() };
+    let search = Search { mass: &mass, values };
     let ((smallest, largest), pose, indefinite) = search.worst(arm);
     let share = indefinite as f64 / POSES as f64;
     if smallest < -ROUNDING * largest.abs() {
@@ -79,36 +79,52 @@ pub fn check(model: &Model, kind: SetKind, values: &[f64]) -> Result<Possibility
     })
 }
 
-/// The smallest eigenvalue of a function that is a symmetric matrix of at most [`MAX_JOINTS`] rows, and the
-/// pose within the limits where it was found, rad or m.
+/// The smallest eigenvalue of B(q), and the pose within the limits where it was found, rad or m.
 ///
 /// # Errors
 /// As [`Model::function`].
 pub(crate) fn smallest_eigenvalue(
     model: &Model,
-    function: Function,
     kind: SetKind,
     values: &[f64],
 ) -> Result<(f64, Vec<f64>), Error> {
-    let matrix = Evaluator::new(model, function, kind)?;
-    let (rows, _) = function.shape(model.arm().dof(), values.len());
-    let ((smallest, _), pose, _) = Search { matrix: &matrix, values, rows }.worst(model.arm());
+    let mass = Evaluator::new(model, Function::MassMatrix, kind)?;
+    let ((smallest, _), pose, _) = Search { mass: &mass, values }.worst(model.arm());
     Ok((smallest, pose))
 }
 
-/// Poses at which a symmetric matrix is worst.
+/// Poses within the limits, rad or m, drawn at random.
+pub(crate) fn poses(arm: &Arm) -> Vec<Vec<f64>> {
+    let limits = limits(arm);
+    let mut draws = Draws::new(0x706f_7365);
+    let mut uniform = || draws.element().residue() as f64 / crate::exact::prime::P as f64;
+    (0..POSES).map(|_| limits.iter().map(|[low, high]| low + (high - low) * uniform()).collect()).collect()
+}
+
+/// Of each coordinate; a turn, or 1 m either way, where the arm file gives none.
+fn limits(arm: &Arm) -> Vec<[f64; 2]> {
+    arm.moving_joints()
+        .map(|joint| {
+            joint.position.unwrap_or(match joint.kind {
+                JointKind::Revolute => [-std::f64::consts::PI, std::f64::consts::PI],
+                JointKind::Prismatic => [-1.0, 1.0],
+            })
+        })
+        .collect()
+}
+
+/// Poses at which B(q) is worst.
 struct Search<'a> {
-    matrix: &'a Evaluator,
+    mass: &'a Evaluator,
     values: &'a [f64],
-    rows: usize,
 }
 
 impl Search<'_> {
-    /// Smallest and largest eigenvalue of the matrix at a pose.
+    /// Smallest and largest eigenvalue of B at a pose.
     fn extremes(&self, q: &[f64]) -> (f64, f64) {
-        let n = self.rows;
+        let n = q.len();
         let mut flat = vec![0.0; n * n];
-        self.matrix.evaluate(q, &[], &[], self.values, &mut flat);
+        self.mass.evaluate(q, &[], &[], self.values, &mut flat);
         if flat.iter().any(|x| !x.is_finite()) {
             return (f64::NEG_INFINITY, f64::INFINITY);
         }
@@ -128,23 +144,9 @@ impl Search<'_> {
     /// The pose of the smallest eigenvalue: random poses within the limits, the best of them refined joint by
     /// joint.
     fn worst(&self, arm: &Arm) -> ((f64, f64), Vec<f64>, usize) {
-        let limits: Vec<[f64; 2]> = arm
-            .moving_joints()
-            .map(|joint| {
-                joint.position.unwrap_or(match joint.kind {
-                    JointKind::Revolute => [-std::f64::consts::PI, std::f64::consts::PI],
-                    JointKind::Prismatic => [-1.0, 1.0],
-                })
-            })
-            .collect();
-        let mut draws = Draws::new(0x706f_7365);
-        let mut uniform = || draws.element().residue() as f64 / crate::exact::prime::P as f64;
-        let mut poses: Vec<(f64, Vec<f64>)> = (0..POSES)
-            .map(|_| {
-                let q: Vec<f64> = limits.iter().map(|[low, high]| low + (high - low) * uniform()).collect();
-                (self.extremes(&q).0, q)
-            })
-            .collect();
+        let limits = limits(arm);
+        let mut poses: Vec<(f64, Vec<f64>)> =
+            poses(arm).into_iter().map(|q| (self.extremes(&q).0, q)).collect();
         let indefinite = poses.iter().filter(|(e, _)| *e < 0.0).count();
         poses.sort_by(|a, b| a.0.total_cmp(&b.0));
         poses.truncate(4);

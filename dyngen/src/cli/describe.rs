@@ -278,6 +278,15 @@ fn rounding_table(t: &mut String, arm: &Arm, rounding: &Rounding) {
         }
     }
     by_joint(t, arm, rounding);
+    let mut only: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+    for (function, bounds) in &rounding.functions {
+        if let Some(poses) = bounds.as_ref().ok().and_then(|of| of.poses.as_ref()) {
+            only.entry(poses.text()).or_default().push(function.name());
+        }
+    }
+    for (poses, functions) in only {
+        let _ = writeln!(t, "  {} {poses}", functions.join(", "));
+    }
     let mut none: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
     for (function, bounds) in &rounding.functions {
         if let Some(why) = why_unbounded(bounds) {

@@ -18,9 +18,11 @@ impl ParameterRange {
     /// In words.
     pub fn text(self) -> &'static str {
         match self {
-            ParameterRange::Values => "the given values; e and f: each number within ±1",
+            ParameterRange::Values => {
+                "the given values; e, f and the payload, a body's: each number within ±1"
+            }
             ParameterRange::Unit => {
-                "each within ±1 SI unit, as no values are given; e and f: each number within ±1"
+                "each within ±1 SI unit, as no values are given; e, f and the payload, a body's: each number within ±1"
             }
         }
     }
@@ -52,6 +54,12 @@ impl Rounding {
                 Ok(bounds) => json!({"f32": numbers(&bounds.single), "f64": numbers(&bounds.double)}),
                 Err(_) => json!({"f32": null, "f64": null}),
             };
+            if let Ok(Bounds { poses: Some(poses), .. }) = bounds {
+                object["where"] = json!({
+                    "task_inertia_diagonal_at_most": numbers(&poses.largest_inertia),
+                    "share_of_poses": poses.share,
+                });
+            }
             if let Some(why) = why_unbounded(bounds) {
                 object["why"] = json!(why);
             }
@@ -68,7 +76,7 @@ pub fn why_unbounded(bounds: &Result<Bounds, String>) -> Option<&str> {
         Err(why) => Some(why),
         Ok(bounds) if is_bounded(&bounds.single) => None,
         Ok(bounds) if is_bounded(&bounds.double) => {
-            Some("in f32: its rounding may change B by more than this proof allows")
+            Some("in f32: its rounding may change B or Λ⁻¹ by more than this proof allows")
         }
         Ok(_) => Some("intervals of these states do not exclude a division by zero"),
     }

@@ -9,19 +9,20 @@
 //! * (B⁻¹)ᵢᵢ is the largest q̇ᵢ² with q̇ᵀBq̇ = 1. A joint's velocity is the difference of those of two links
 //!   about its axis z, and ω of a body with inertia I about its centre has (z·ω)² ≤ zᵀI⁻¹z times ωᵀIω. The
 //!   sum of both links' zᵀI⁻¹z is bᵢ ≥ (B⁻¹)ᵢᵢ.
-//! * Everything else by the inequality of Cauchy and Schwarz: |(B⁻¹)ᵢⱼ|² ≤ bᵢbⱼ, |Lₖⱼ|² ≤ Bⱼⱼ/dₖ, and column
-//!   k of L⁻¹ is how joints without torque move if joint k does with 1: twice the energy is dₖ, so |L⁻¹ⱼₖ|² ≤
-//!   bⱼdₖ.
+//! * A rotor on the link before joint i turns about z with that link's w = z·ω and k·q̇ᵢ more. Its energy is
+//!   ½Iₘ(w + k·q̇ᵢ)². The link's parameters hold the part ½Iₘw²: a body is a link without the rotor on it. A
+//!   pivot gets Iₘk² more, as the links before are at rest; and by the difference of w + k·q̇ᵢ and w
+//!   (B⁻¹)ᵢᵢ ≤ (1/Iₘ + zᵀI⁻¹z)/k² too.
+//! * Everything else follows from these ([`Factors::of_energy`]).
 
-use super::factors::{Factors, MassMatrix};
-use super::interval::Interval;
+use super::factors::{Factors, PosedMatrix, ROUNDED};
 use crate::arm::{Arm, Convention, Joint, JointKind, Parameter, ParameterKind};
-use crate::consistency::pseudo_inertia;
+use crate::consistency::{parameters_of_body, pseudo_inertia};
 use crate::exact::rational::to_f64;
 use crate::parameters::{ParameterSet, SetParameter};
 use nalgebra::{Matrix3, Vector3};
 
-/// A link as a body.
+/// A link as a body, without the rotor on it.
 struct Body {
     /// kg
     mass: f64,
@@ -41,42 +42,89 @@ struct Axis {
     point: Vector3<f64>,
 }
 
+/// The rotor of a joint, on the link before it.
+struct Rotor {
+    /// kg·m²
+    inertia: f64,
+    ratio: f64,
+    /// Its axis in that link's frame.
+    axis: Vector3<f64>,
+}
+
+impl Rotor {
+    fn of(arm: &Arm, set: &ParameterSet, values: &[f64], joint: usize) -> Option<Rotor> {
+        let at = &arm.joints[joint];
+        let ratio = to_f64(at.rotor_ratio.as_ref()?);
+        let [before, _] = axis(arm.convention, at);
+        Some(Rotor { inertia: given(set, values, joint, ParameterKind::Im), ratio, axis: before.z })
+    }
+
+    /// Twice its energy where the joint moves with 1 and the links before are at rest.
+    fn reflected(&self) -> f64 {
+        self.inertia * self.ratio * self.ratio
+    }
+}
+
+/// A parameter's value; zero where the set has none of it.
+fn given(set: &ParameterSet, values: &[f64], link: usize, kind: ParameterKind) -> f64 {
+    let wanted = Parameter { link, kind };
+    let own = |p: &SetParameter| matches!(&p.terms[..], [(q, _)] if *q == wanted);
+    set.parameters.iter().position(own).and_then(|k| values.get(k)).copied().unwrap_or(0.0)
+}
+
 /// The ranges for `values` of the full set.
 ///
 /// # Errors
-/// Where a link is no body with mass and volume, or the energy is more than that of the links: rotors, bars
-/// of loops, joints that follow others.
+/// Where a link without the rotors on it is no body with mass and volume, or the energy is more than that of
+/// links and rotors: bars of loops, joints that follow others, motors that drive several joints.
 pub(super) fn factors(
     arm: &Arm,
     set: &ParameterSet,
     values: &[f64],
-    mass: &MassMatrix,
+    mass: &PosedMatrix,
 ) -> Result<Factors, String> {
-    if let Some(i) = arm.joints.iter().position(|joint| joint.rotor_ratio.is_some()) {
-        return Err(format!("joint {} has a rotor", i + 1));
-    }
     if arm.has_mimics() || !arm.bars.is_empty() {
         return Err("joints follow others".to_string());
+    }
+    if !arm.transmissions.is_empty() {
+        return Err("motors drive several joints".to_string());
     }
     if values.len() != set.parameters.len() {
         return Err(format!("{} values for {} parameters", values.len(), set.parameters.len()));
     }
     let n = arm.joints.len();
-    let of = |link| Body::of(set, values, link).ok_or_else(|| format!("link {} has no volume", link + 1));
+    let rotors: Vec<Option<Rotor>> = (0..n).map(|i| Rotor::of(arm, set, values, i)).collect();
+    if let Some(i) = rotors.iter().position(|rotor| rotor.as_ref().is_some_and(|r| r.inertia <= 0.0)) {
+        return Err(format!("rotor {} has no inertia", i + 1));
+    }
+    let of = |link: usize| {
+        let on_it = rotors.get(link + 1).and_then(Option::as_ref);
+        Body::of(set, values, link, on_it).ok_or_else(|| format!("link {} has no volume", link + 1))
+    };
     let bodies = (0..n).map(of).collect::<Result<Vec<Body>, String>>()?;
-    of_bodies(arm, &bodies, mass).ok_or_else(|| "rounded parameters may change B by too much".to_string())
+    of_bodies(arm, (&bodies, &rotors), mass)
+        .ok_or_else(|| "rounded parameters may change B by too much".to_string())
 }
 
-fn of_bodies(arm: &Arm, bodies: &[Body], mass: &MassMatrix) -> Option<Factors> {
-    let most = mass.largest_diagonal(HALVINGS)?;
+fn of_bodies(
+    arm: &Arm,
+    (bodies, rotors): (&[Body], &[Option<Rotor>]),
+    mass: &PosedMatrix,
+) -> Option<Factors> {
+    let most = mass.largest_diagonal()?;
     let n = most.len();
     let (mut least, mut velocity) = (vec![0.0; n], vec![0.0; n]);
     for (i, joint) in arm.joints.iter().enumerate() {
         let [before, own] = axis(arm.convention, joint);
-        least[i] = bodies[i].along(joint.kind, &own);
+        let rotor = rotors[i].as_ref();
+        least[i] = bodies[i].along(joint.kind, &own) + rotor.map_or(0.0, Rotor::reflected);
         velocity[i] = match i.checked_sub(1) {
             None => 1.0 / least[i],
-            Some(k) => bodies[i].mobility(joint.kind, &own) + bodies[k].mobility(joint.kind, &before),
+            Some(k) => {
+                let of_links = bodies[i].mobility(joint.kind, &own) + bodies[k].mobility(joint.kind, &before);
+                let turning = bodies[k].mobility(JointKind::Revolute, &before);
+                rotor.map_or(of_links, |r| of_links.min((1.0 / r.inertia + turning) / r.ratio.powi(2)))
+            }
         };
     }
     // The emitted code has the parameters of its set, rounded: a B' with |xᵀ(B' − B)x| ≤ share·xᵀBx.
@@ -88,64 +136,29 @@ fn of_bodies(arm: &Arm, bodies: &[Body], mass: &MassMatrix) -> Option<Factors> {
     }
     least.iter_mut().for_each(|x| *x *= 1.0 - share);
     velocity.iter_mut().for_each(|x| *x /= 1.0 - share);
-    let is_size = |x: &f64| x.is_finite() && *x > 0.0;
-    if ![&least, &velocity, &most].iter().all(|all| all.iter().all(is_size)) {
-        return None;
-    }
-    let root = |x: f64| Interval::within(x.sqrt() * ROUNDED);
-    let mut found = Factors {
-        n,
-        inverse: vec![Interval::point(0.0); n * n],
-        lower: vec![Interval::point(0.0); n * n],
-        lower_inverse: vec![Interval::point(0.0); n * n],
-        pivots: (0..n).map(|i| Interval { low: least[i] / ROUNDED, high: most[i] * ROUNDED }).collect(),
-        diagonal: Some(most.iter().map(|x| x * ROUNDED).collect()),
-    };
-    for i in 0..n {
-        for j in 0..n {
-            let at = i * n + j;
-            found.inverse[at] = root(velocity[i] * velocity[j]);
-            if j < i {
-                found.lower[at] = root(most[j] / least[i]);
-                found.lower_inverse[at] = root(velocity[i] * most[j]);
-            }
-        }
-        let at = i * n + i;
-        found.inverse[at].low = 1.0 / (most[i] * ROUNDED);
-        (found.lower[at], found.lower_inverse[at]) = (Interval::point(1.0), Interval::point(1.0));
-    }
-    Some(found)
+    Factors::of_energy(&least, &velocity, &most)
 }
-
-/// Halvings of the poses for each entry of B's diagonal.
-const HALVINGS: usize = 400;
 
 /// The share of B by which rounded parameters may move it.
 const MOVED: f64 = 0.5;
-
-/// More than what these sums and products of doubles round.
-const ROUNDED: f64 = 1.0 + 1e-9;
 
 /// Of the smallest eigenvalue of a pseudo-inertia, relative to the largest: below that a body has no volume.
 const THIN: f64 = 1e-9;
 
 impl Body {
-    /// `None` where it has no volume ([`THIN`]).
-    fn of(set: &ParameterSet, values: &[f64], link: usize) -> Option<Body> {
-        let given = |kind: &ParameterKind| -> f64 {
-            let wanted = Parameter { link, kind: *kind };
-            let own = |p: &SetParameter| matches!(&p.terms[..], [(q, _)] if *q == wanted);
-            set.parameters.iter().position(own).and_then(|k| values.get(k)).copied().unwrap_or(0.0)
-        };
-        let v: [f64; 10] = std::array::from_fn(|k| given(&ParameterKind::ALL[k]));
-        let eigenvalues = pseudo_inertia(&v).symmetric_eigenvalues();
-        if eigenvalues.min() <= THIN * eigenvalues.max() {
-            return None;
-        }
+    /// A link without the rotor on it; `None` where it has no volume ([`THIN`]).
+    fn of(set: &ParameterSet, values: &[f64], link: usize, rotor: Option<&Rotor>) -> Option<Body> {
+        let v: [f64; 10] = std::array::from_fn(|k| given(set, values, link, ParameterKind::ALL[k]));
         let [mass, mx, my, mz, xx, xy, xz, yy, yz, zz] = v;
         let moment = Vector3::new(mx, my, mz);
         let centre = moment / mass;
-        let about_origin = Matrix3::new(xx, -xy, -xz, -xy, yy, -yz, -xz, -yz, zz);
+        let spin = rotor.map_or(Matrix3::zeros(), |r| r.axis * r.axis.transpose() * r.inertia);
+        let about_origin = Matrix3::new(xx, -xy, -xz, -xy, yy, -yz, -xz, -yz, zz) - spin;
+        let eigenvalues =
+            pseudo_inertia(&parameters_of_body(mass, &moment, &about_origin)).symmetric_eigenvalues();
+        if eigenvalues.min() <= THIN * eigenvalues.max() {
+            return None;
+        }
         let shift = centre.cross_matrix();
         let inertia = about_origin + shift * shift * mass;
         let of_inertia = inertia.try_inverse()?;

@@ -1,5 +1,5 @@
-//! Bounds of functions that divide by pivots of B: exact values and what the emitted ones are off by, kept
-//! apart.
+//! Bounds of functions that divide by pivots of B or of Λ⁻¹: exact values and what the emitted ones are off
+//! by, kept apart.
 //!
 //! What is known of a solve (`known.rs`) holds for exact values alone. So each operation has the range of its
 //! exact value and, forwards from its operands, how far the emitted one may be off (running error analysis,
@@ -24,21 +24,19 @@ impl Program {
         values.clear();
         errors.clear();
         deviations.clear();
-        let mut running = solves.as_ref().map(Solves::start);
+        let mut running: Vec<_> = solves.iter().map(Solves::start).collect();
         for (k, operation) in self.operations.iter().enumerate() {
             let (value, from_operands) = self.exact(*operation, ranges, values, deviations)?;
-            let mut error = match *operation {
-                Operation::Constant(_, errors) => errors,
-                Operation::Variable(_) => EXACT,
-                Operation::Sine(index) => self.angles[index].1.turned(true, ranges)?.1,
-                Operation::Cosine(index) => self.angles[index].1.turned(false, ranges)?.1,
-                Operation::Mul(a, b) if self.is_power_of_two(a) || self.is_power_of_two(b) => TINY,
-                _ => rounds(value, from_operands),
+            let error = |value: Interval| match *operation {
+                _ if self.rounds_nothing(k) => Some(EXACT),
+                Operation::Constant(_, errors) => Some(errors),
+                Operation::Variable(_) => Some(EXACT),
+                Operation::Sine(index) => Some(self.angles[index].1.turned(true, ranges)?.1),
+                Operation::Cosine(index) => Some(self.angles[index].1.turned(false, ranges)?.1),
+                Operation::Mul(a, b) if self.is_power_of_two(a) || self.is_power_of_two(b) => Some(TINY),
+                _ => Some(rounds(value, from_operands)),
             };
-            if self.rounds_nothing(k) {
-                error = EXACT;
-            }
-            errors.push(error);
+            errors.push(error(value)?);
             let mut value = value.widened(0.0);
             if let Some(norm) = &self.norms[k] {
                 value = value.clamped(norm.bound(values, errors));
@@ -51,17 +49,22 @@ impl Program {
                     value.clamped(most * (1.0 + 1e-12))
                 }
             };
+            // What is known of the exact value bounds what it rounds as well.
+            errors[k] = error(value)?;
+            let error = errors[k];
             let deviation = [0, 1].map(|p| no_number_is_infinite((from_operands[p] + error[p]) * GROWN));
             if value.magnitude().is_nan() {
                 return None;
             }
             values.push(value);
             deviations.push(deviation);
-            if let (Some(solves), Some(running)) = (solves, &mut running)
-                && k < self.emitted
-            {
+            for (solves, running) in solves.iter().zip(&mut running).filter(|_| k < self.emitted) {
                 let so_far = SoFar { operations: &self.operations, values, deviations, errors };
                 (values[k], deviations[k]) = solves.take(running, so_far);
+            }
+            // No pose of these is one where the ranges hold.
+            if values[k].low > values[k].high {
+                return Some(EXACT);
             }
             if values[k].magnitude() + deviations[k][0] >= f64::from(f32::MAX) {
                 deviations[k][0] = f64::INFINITY;

@@ -30,12 +30,12 @@ pub(super) struct Factors {
     pub(super) lower_inverse: Vec<Interval>,
     /// D
     pub(super) pivots: Vec<Interval>,
-    /// The largest entries of B's diagonal, where the ranges are those of `bodies.rs`.
+    /// The largest entries of B's diagonal, where the ranges are those of [`Factors::of_energy`].
     pub(super) diagonal: Option<Vec<f64>>,
 }
 
-/// B of an arm, over boxes of poses.
-pub(super) struct MassMatrix {
+/// B of an arm, or its Jacobian, over boxes of poses.
+pub(super) struct PosedMatrix {
     code: Emitted,
     /// Of each entry its operation and sign; `None` where it is zero.
     entries: Vec<Option<(usize, bool)>>,
@@ -46,8 +46,8 @@ pub(super) struct MassMatrix {
     varied: Vec<usize>,
 }
 
-impl MassMatrix {
-    /// From the graph of the mass matrix; `None` where a limit or a value is missing.
+impl PosedMatrix {
+    /// The outputs of a function's graph, as a matrix; `None` where a limit or a value is missing.
     pub(super) fn new(model: &Model, built: &FunctionGraph, limits: &Limits<'_>) -> Option<Self> {
         let n = built.joints;
         let nonzero: Vec<_> = built.outputs.iter().copied().filter(|e| *e != Expr::ZERO).collect();
@@ -60,7 +60,7 @@ impl MassMatrix {
         let ranges: Option<Vec<Interval>> = code.variables.iter().map(|v| limits.range(*v)).collect();
         let is_position = |k: &usize| code.variables[*k].0 == Argument::Positions;
         let varied = (0..code.variables.len()).filter(is_position).collect();
-        Some(MassMatrix { entries, n, ranges: ranges?, varied, code })
+        Some(PosedMatrix { entries, n, ranges: ranges?, varied, code })
     }
 
     /// Halves boxes of poses until e is below `most` in each of them; `None` where that takes more than
@@ -93,37 +93,45 @@ impl MassMatrix {
         Some(found)
     }
 
-    /// At least the largest entries of the diagonal; poses are halved where an entry's bound is largest,
-    /// `boxes` times for each. `None` where an angle is too large.
-    pub(super) fn largest_diagonal(&self, boxes: usize) -> Option<Vec<f64>> {
+    /// At least the largest entries of the diagonal; `None` where an angle is too large.
+    pub(super) fn largest_diagonal(&self) -> Option<Vec<f64>> {
+        (0..self.n).map(|i| self.largest(self.entries[i * self.n + i]?)).collect()
+    }
+
+    /// At least the largest sizes of all entries; `None` where an angle is too large.
+    pub(super) fn largest_sizes(&self) -> Option<Vec<f64>> {
+        let size = |entry: &Option<(usize, bool)>| {
+            let Some((place, negative)) = *entry else { return Some(0.0) };
+            Some(self.largest((place, negative))?.max(self.largest((place, !negative))?))
+        };
+        self.entries.iter().map(size).collect()
+    }
+
+    /// At least the largest value of an entry: poses are halved where its bound is largest.
+    fn largest(&self, (place, negative): (usize, bool)) -> Option<f64> {
         let mut gradient = Gradient::default();
         let m = self.varied.len();
-        let mut largest = Vec::with_capacity(self.n);
-        for i in 0..self.n {
-            let (place, negative) = self.entries[i * self.n + i]?;
-            // The bound over a box, and the variable that adds most to it.
-            let mut bound = |ranges: &[Interval]| -> Option<(f64, Option<usize>)> {
-                gradient.evaluate(&self.code, ranges, &self.varied)?;
-                let slope = |which: usize| gradient.slopes[place * m + which].magnitude();
-                let adds = |which: &usize| ranges[self.varied[*which]].width() * slope(*which);
-                let widest = (0..m).max_by(|a, b| adds(a).total_cmp(&adds(b))).filter(|w| adds(w) > 0.0);
-                let value = gradient.values[place].negated(negative).high;
-                Some((value, widest.map(|which| self.varied[which])))
-            };
-            let mut parts = vec![(bound(&self.ranges)?, self.ranges.clone())];
-            for _ in 0..boxes {
-                let worst = (0..parts.len()).max_by(|a, b| parts[*a].0.0.total_cmp(&parts[*b].0.0))?;
-                let (_, Some(widest)) = parts[worst].0 else { break };
-                let (_, ranges) = parts.swap_remove(worst);
-                for half in ranges[widest].halves() {
-                    let mut ranges = ranges.clone();
-                    ranges[widest] = half;
-                    parts.push((bound(&ranges)?, ranges));
-                }
+        // The bound over a box, and the variable that adds most to it.
+        let mut bound = |ranges: &[Interval]| -> Option<(f64, Option<usize>)> {
+            gradient.evaluate(&self.code, ranges, &self.varied)?;
+            let slope = |which: usize| gradient.slopes[place * m + which].magnitude();
+            let adds = |which: &usize| ranges[self.varied[*which]].width() * slope(*which);
+            let widest = (0..m).max_by(|a, b| adds(a).total_cmp(&adds(b))).filter(|w| adds(w) > 0.0);
+            let value = gradient.values[place].negated(negative).high;
+            Some((value, widest.map(|which| self.varied[which])))
+        };
+        let mut parts = vec![(bound(&self.ranges)?, self.ranges.clone())];
+        for _ in 0..HALVINGS {
+            let worst = (0..parts.len()).max_by(|a, b| parts[*a].0.0.total_cmp(&parts[*b].0.0))?;
+            let (_, Some(widest)) = parts[worst].0 else { break };
+            let (_, ranges) = parts.swap_remove(worst);
+            for half in ranges[widest].halves() {
+                let mut ranges = ranges.clone();
+                ranges[widest] = half;
+                parts.push((bound(&ranges)?, ranges));
             }
-            largest.push(parts.iter().map(|((value, _), _)| *value).fold(f64::NEG_INFINITY, f64::max));
         }
-        Some(largest)
+        Some(parts.iter().map(|((value, _), _)| *value).fold(f64::NEG_INFINITY, f64::max))
     }
 
     /// By how much the rounding of given parameters to either format moves each entry at most, row-major.
@@ -320,6 +328,43 @@ impl Factors {
         Factors { n, inverse, lower, lower_inverse, pivots: vec![nothing; n], diagonal: None }
     }
 
+    /// The ranges that follow from pivots of at least `least`, from bᵢ = `mobility` ≥ (B⁻¹)ᵢᵢ and from `most`
+    /// ≥ Bᵢᵢ; `None` where one of these is not positive and finite.
+    ///
+    /// By the inequality of Cauchy and Schwarz |(B⁻¹)ᵢⱼ|² ≤ bᵢbⱼ and |Lₖⱼ|² ≤ Bⱼⱼ/dₖ. Column k of L⁻¹ is how
+    /// joints without torque move if joint k does with 1: twice the energy is dₖ, so |L⁻¹ⱼₖ|² ≤ bⱼdₖ.
+    pub(super) fn of_energy(least: &[f64], mobility: &[f64], most: &[f64]) -> Option<Factors> {
+        let is_size = |x: &f64| x.is_finite() && *x > 0.0;
+        if ![least, mobility, most].iter().all(|all| all.iter().all(is_size)) {
+            return None;
+        }
+        let n = most.len();
+        let root = |x: f64| Interval::within(x.sqrt() * ROUNDED);
+        let mut found = Factors {
+            pivots: (0..n).map(|i| Interval { low: least[i] / ROUNDED, high: most[i] * ROUNDED }).collect(),
+            diagonal: Some(most.iter().map(|x| x * ROUNDED).collect()),
+            ..Factors::none(n)
+        };
+        for i in 0..n {
+            for j in 0..n {
+                let at = i * n + j;
+                let zero_above = |x: f64| root(if j < i { x } else { 0.0 });
+                found.inverse[at] = root(mobility[i] * mobility[j]);
+                found.lower[at] = zero_above(most[j] / least[i]);
+                found.lower_inverse[at] = zero_above(mobility[i] * most[j]);
+            }
+            let at = i * n + i;
+            found.inverse[at].low = 1.0 / (most[i] * ROUNDED);
+            (found.lower[at], found.lower_inverse[at]) = (Interval::point(1.0), Interval::point(1.0));
+        }
+        Some(found)
+    }
+
+    /// At least the entries of the diagonal of B⁻¹.
+    pub(super) fn mobility(&self) -> Vec<f64> {
+        (0..self.n).map(|i| self.inverse[i * self.n + i].high).collect()
+    }
+
     /// Widens the ranges by those of a box of poses with the factors of 1 + E within `off` of 1.
     fn include(&mut self, k: &[f64], off: &[f64]) {
         let n = self.n;
@@ -389,6 +434,12 @@ fn inverted(lower: &[Interval], n: usize) -> Vec<Interval> {
 fn times(a: Interval, b: Interval) -> Interval {
     a.times(b).widened(0.0)
 }
+
+/// Halvings of the poses for the largest value of an entry.
+const HALVINGS: usize = 400;
+
+/// More than what these sums and products of doubles round.
+pub(super) const ROUNDED: f64 = 1.0 + 1e-9;
 
 /// The share of the poses that the tenth part of the boxes must prove.
 const HOPELESS: f64 = 0.01;

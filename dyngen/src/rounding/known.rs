@@ -1,4 +1,5 @@
-//! What is known of the numbers between B and the results of a solve with LᵀDL: bounds for every pose.
+//! What is known of the numbers between B, or Λ⁻¹, and the results of a solve with LᵀDL: bounds for every
+//! pose.
 //!
 //! The optimiser is free to reorder sums, so an operation is recognised by its value: at a random point of
 //! the 61-bit prime field it equals that of an entry of L, of B⁻¹, … (two that differ agree there with a
@@ -39,16 +40,16 @@ enum Fact {
 pub(super) struct KnownProgram {
     /// By operation.
     pub(super) known: Vec<Option<Known>>,
-    /// Of arms whose links are known as bodies.
-    pub(super) solves: Option<Solves>,
+    /// Factorisations whose ranges are those of [`Factors::of_energy`], in the order of the program.
+    pub(super) solves: Vec<Solves>,
 }
 
 /// All facts about a function, with the values of its operations.
 pub(super) struct Facts<'a> {
     facts: FxHashMap<u64, Fact>,
     nodes: Vec<Option<Fp>>,
-    ranges: &'a Factors,
-    exact: Exact,
+    /// Factorisations with their ranges, in the order of the program.
+    solves: Vec<(Exact, &'a Factors)>,
 }
 
 /// LᵀDL at the random point, and the ranges of its entries.
@@ -62,40 +63,65 @@ struct Solve<'a> {
     pivots: Vec<Fp>,
 }
 
+/// A row-major matrix at the random point, and the ranges of its entries.
+struct Ranged {
+    columns: usize,
+    entries: Vec<(Fp, Interval)>,
+}
+
+impl Ranged {
+    fn at(&self, i: usize, j: usize) -> (Fp, Interval) {
+        self.entries[i * self.columns + j]
+    }
+
+    fn transposed(&self) -> Ranged {
+        let rows = self.entries.len() / self.columns;
+        let entries = (0..self.entries.len()).map(|k| self.at(k % rows, k / rows)).collect();
+        Ranged { columns: rows, entries }
+    }
+}
+
 impl<'a> Facts<'a> {
+    /// Facts from the ranges for B, and from those for Λ⁻¹ where the function divides by its pivots too.
     /// `None` where the point is none of the function's, which chance excludes.
-    pub(super) fn new(model: &Model, built: &FunctionGraph, ranges: &'a Factors) -> Option<Facts<'a>> {
+    pub(super) fn new(
+        model: &Model,
+        built: &FunctionGraph,
+        ranges: &'a Factors,
+        task: Option<&'a Factors>,
+    ) -> Option<Facts<'a>> {
         let set = model.set(SetKind::Minimal).ok()?;
         let mut draws = Draws::new(0x0073_6f6c_7665);
         let point = Point::draw(model.arm(), model.symbols(), model.sets(), &mut draws);
+        let point = point.seen_by(built.function);
         let expected = |function| prove::expected(&point, set, function);
-        let solve =
-            Solve::new(expected(Function::MassMatrix), expected(Function::MassMatrixInverse), ranges)?;
-        let (b, lower, pivots) = (solve.b.clone(), solve.lower.clone(), solve.pivots.clone());
-        let exact = Exact { n: solve.n, b, lower, pivots, solutions: Vec::new() };
-        let mut facts = Facts { facts: FxHashMap::default(), nodes: point.nodes(set, built)?, ranges, exact };
-        facts.of_factors(&solve);
+        let solve = Solve::new(expected(Function::MassMatrix), ranges)?;
         let n = solve.n;
-        match built.function {
-            Function::MassMatrixInverse => {
-                facts.of_inverse(&solve);
-                let column = |j: usize| (0..n).map(|i| solve.inverse[i * n + j]).collect();
-                facts.exact.solutions.extend((0..n).map(column));
+        let mut facts =
+            Facts { facts: FxHashMap::default(), nodes: point.nodes(set, built)?, solves: Vec::new() };
+        facts.of_factors(&solve);
+        facts.of_eliminated(&solve);
+        let solutions = match built.function {
+            Function::MassMatrixInverse => columns(&solve.inverse, n),
+            Function::ForwardDynamics | Function::ForwardDynamicsWithPayload => {
+                vec![expected(Function::ForwardDynamics)]
             }
-            Function::ForwardDynamics => facts.of_solution(&solve, &expected(Function::ForwardDynamics)),
             Function::AccelerationByPosition | Function::AccelerationByVelocity => {
-                facts.of_solution(&solve, &expected(Function::ForwardDynamics));
-                let columns = expected(built.function);
-                for c in 0..n {
-                    let column: Vec<Fp> = (0..n).map(|i| columns[i * n + c]).collect();
-                    facts.of_solution(&solve, &column);
-                }
+                let derivatives = columns(&expected(built.function), n);
+                std::iter::once(expected(Function::ForwardDynamics)).chain(derivatives).collect()
             }
-            _ => {
-                for row in expected(Function::Jacobian).chunks(n) {
-                    facts.of_solution(&solve, &product(&solve.inverse, row));
-                }
-            }
+            _ => expected(Function::Jacobian).chunks(n).map(|row| product(&solve.inverse, row)).collect(),
+        };
+        if built.function == Function::MassMatrixInverse {
+            facts.of_products(&solve.inverse(), &solve.inverse());
+        } else {
+            solutions.iter().for_each(|x| facts.of_solution(&solve, x));
+        }
+        facts.solves.push((solve.exact(solutions), ranges));
+        if let Some(ranges) = task {
+            let task = Solve::new(expected(Function::TaskInertiaInverse), ranges)?;
+            facts.of_task(&solve, &task, expected(Function::ConsistentInverse));
+            facts.solves.push((task.exact(columns(&task.inverse, task.n)), ranges));
         }
         Some(facts)
     }
@@ -135,15 +161,36 @@ impl<'a> Facts<'a> {
         }
     }
 
-    /// The derivatives of B⁻¹ by what is left of B: ∂X = −X·∂S·X.
-    fn of_inverse(&mut self, solve: &Solve<'_>) {
-        let (n, x, ranges) = (solve.n, &solve.inverse, &solve.ranges.inverse);
-        for (o, c) in (0..n).flat_map(|o| (0..n).map(move |c| (o, c))) {
-            for (a, b) in (0..n).flat_map(|a| (0..=a).map(move |b| (a, b))) {
-                let first = x[o * n + a] * x[b * n + c];
-                let of_first = ranges[o * n + a].times(ranges[b * n + c]).widened(0.0);
-                let second = x[o * n + b] * x[a * n + c];
-                let of_second = ranges[o * n + b].times(ranges[a * n + c]).widened(0.0);
+    /// Entries of B, and what is subtracted from them and left of them on the way to L and D, where B's
+    /// diagonal has a bound: what is left is positive definite, and each Lₖᵢ·dₖ·Lₖⱼ is an entry of a positive
+    /// semidefinite matrix, both at most B.
+    fn of_eliminated(&mut self, solve: &Solve<'_>) {
+        let (n, ranges) = (solve.n, solve.ranges);
+        let Some(diagonal) = &ranges.diagonal else { return };
+        for (i, j) in (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+            let range = Interval::within((diagonal[i] * diagonal[j]).sqrt() * ROUNDED);
+            let mut left = solve.b[i * n + j];
+            self.range(left, range);
+            for k in (i + 1..n).rev() {
+                let product = solve.lower[k * n + i] * solve.pivots[k] * solve.lower[k * n + j];
+                left = left - product;
+                self.range(product, range);
+                self.range(left, range);
+            }
+        }
+    }
+
+    /// Products of two matrices with what is between them replaced by an entry of a symmetric matrix and its
+    /// mirror: derivatives of an inverse X by what is left of its matrix are −X·∂S·X.
+    fn of_products(&mut self, left: &Ranged, right: &Ranged) {
+        let inner = left.columns;
+        for (o, c) in (0..left.entries.len() / inner).flat_map(|o| (0..right.columns).map(move |c| (o, c))) {
+            for (a, b) in (0..inner).flat_map(|a| (0..=a).map(move |b| (a, b))) {
+                let of = |a: usize, b: usize| {
+                    let ((x, of_x), (y, of_y)) = (left.at(o, a), right.at(b, c));
+                    (x * y, of_x.times(of_y).widened(0.0))
+                };
+                let ((first, of_first), (second, of_second)) = (of(a, b), of(b, a));
                 match a == b {
                     true => self.range(first, of_first),
                     false => self.range(first + second, of_first.plus(of_second).widened(0.0)),
@@ -152,10 +199,24 @@ impl<'a> Facts<'a> {
         }
     }
 
+    /// Factors of Λ⁻¹, entries of Λ and of J̄, and their derivatives by what is left of Λ⁻¹ and of B. As
+    /// J̄ᵀBJ̄ = Λ, |J̄ᵢⱼ|² ≤ (B⁻¹)ᵢᵢ·Λⱼⱼ.
+    fn of_task(&mut self, mass: &Solve<'_>, task: &Solve<'_>, consistent: Vec<Fp>) {
+        self.of_factors(task);
+        self.of_eliminated(task);
+        let (of_mass, of_task) = (mass.ranges.mobility(), task.ranges.mobility());
+        let most = |k: usize| (of_mass[k / task.n] * of_task[k % task.n]).sqrt() * ROUNDED;
+        let entries = consistent.into_iter().enumerate().map(|(k, x)| (x, Interval::within(most(k))));
+        let consistent = Ranged { columns: task.n, entries: entries.collect() };
+        consistent.entries.iter().for_each(|(x, range)| self.range(*x, *range));
+        self.of_products(&task.inverse(), &task.inverse());
+        self.of_products(&consistent, &task.inverse());
+        self.of_products(&consistent.transposed(), &consistent);
+    }
+
     /// What is computed on the way from r = B·x to x, and the derivatives of x by what is left of B.
     fn of_solution(&mut self, solve: &Solve<'_>, x: &[Fp]) {
         let (n, ranges) = (solve.n, solve.ranges);
-        self.exact.solutions.push(x.to_vec());
         let right: Rc<[Fp]> = product(&solve.b, x).into();
         let size = |o: usize, j: usize| ranges.inverse[o * n + j].magnitude();
         let of = |i: usize, factor: f64| -> Vec<f64> {
@@ -212,13 +273,16 @@ impl<'a> Facts<'a> {
                 .or_else(|| turned(self.facts.get(&(-*value).residue()), true))
         };
         let emitted = nodes.len();
-        let solves = Solves::new(&self.exact, self.ranges, &operations[..emitted], &values[..emitted]);
+        let of = |(exact, ranges): &(Exact, &Factors)| {
+            Solves::new(exact, ranges, &operations[..emitted], &values[..emitted])
+        };
+        let solves = self.solves.iter().filter_map(of).collect();
         Some(KnownProgram { known: values.iter().enumerate().map(known).collect(), solves })
     }
 }
 
 impl<'a> Solve<'a> {
-    fn new(b: Vec<Fp>, inverse: Vec<Fp>, ranges: &'a Factors) -> Option<Self> {
+    fn new(b: Vec<Fp>, ranges: &'a Factors) -> Option<Self> {
         let n = ranges.n;
         let (mut lower, mut scaled, mut pivots) =
             (vec![Fp::ZERO; n * n], vec![Fp::ZERO; n * n], vec![Fp::ZERO; n]);
@@ -242,8 +306,30 @@ impl<'a> Solve<'a> {
                 lower_inverse[i * n + j] = -sum;
             }
         }
+        let mut inverse = vec![Fp::ZERO; n * n];
+        for k in 0..n {
+            let of_pivot = pivots[k].inverse()?;
+            for at in 0..n * n {
+                let product = lower_inverse[at / n * n + k] * lower_inverse[at % n * n + k];
+                inverse[at] = inverse[at] + product * of_pivot;
+            }
+        }
         Some(Solve { n, ranges, b, lower, lower_inverse, inverse, pivots })
     }
+
+    fn exact(&self, solutions: Vec<Vec<Fp>>) -> Exact {
+        let (b, lower, pivots) = (self.b.clone(), self.lower.clone(), self.pivots.clone());
+        Exact { n: self.n, b, lower, pivots, solutions }
+    }
+
+    fn inverse(&self) -> Ranged {
+        let entries = self.inverse.iter().copied().zip(self.ranges.inverse.iter().copied()).collect();
+        Ranged { columns: self.n, entries }
+    }
+}
+
+fn columns(matrix: &[Fp], n: usize) -> Vec<Vec<Fp>> {
+    (0..n).map(|c| matrix.iter().skip(c).step_by(n).copied().collect()).collect()
 }
 
 /// A·x of a square matrix.

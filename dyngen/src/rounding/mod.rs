@@ -20,10 +20,12 @@ mod interval;
 mod known;
 mod limits;
 mod norms;
+mod payload;
 mod precision;
 mod program;
 mod search;
 mod slopes;
+mod task;
 #[cfg(test)]
 mod tests;
 
@@ -32,11 +34,12 @@ use crate::dynamics::function::Argument;
 use crate::dynamics::{Function, FunctionGraph};
 use crate::model::Model;
 use crate::parameters::SetKind;
-use factors::{Factors, MassMatrix};
+use factors::{Factors, PosedMatrix};
 use known::Facts;
 use limits::Limits;
 use program::Program;
 use std::sync::OnceLock;
+use task::Task;
 
 /// Bounds of one function by output, row by row: of |emitted − exact|, in the outputs' units. Infinite where
 /// a divisor may be zero for all that intervals show.
@@ -46,11 +49,35 @@ pub struct Bounds {
     pub single: Vec<f64>,
     /// In `f64`.
     pub double: Vec<f64>,
+    /// The poses for which they hold; `None` where these are all poses within the limits.
+    pub poses: Option<Where>,
+}
+
+/// The poses for which bounds of Λ and J̄ hold: where J is far enough from losing rank.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Where {
+    /// The largest entries of Λ's diagonal, kg and kg·m², in base axes.
+    pub largest_inertia: Vec<f64>,
+    /// The share of poses within the limits, drawn at random, at which all six entries are no larger.
+    pub share: f64,
+}
+
+impl Where {
+    /// In words.
+    pub fn text(&self) -> String {
+        let diagonal: Vec<String> = self.largest_inertia.iter().map(ToString::to_string).collect();
+        format!(
+            "at poses where no entry of Λ's diagonal is above [{}] kg and kg·m²: {:.0} % of the poses within \
+             the limits",
+            diagonal.join(", "),
+            100.0 * self.share
+        )
+    }
 }
 
 /// Bounds for a function of an arm. `parameters` are the values of its set; where there are none, each
 /// parameter is within ±1 in SI units. So is each number of the vector e, of the wrench f, of a payload and
-/// of a direction.
+/// of a direction. The payload of `forward_dynamics_with_payload` is one that a body can have.
 ///
 /// What the function is given counts as exact. The same input gives the same bounds on every machine but for
 /// what sines of the standard library do to their last digits.
@@ -69,12 +96,16 @@ pub struct Bounder<'a> {
     /// Values of the full set.
     links: Option<&'a [f64]>,
     factors: OnceLock<Result<Factors, String>>,
+    /// With a payload.
+    loaded: OnceLock<Result<Factors, String>>,
+    task: OnceLock<Result<Task, String>>,
 }
 
 impl<'a> Bounder<'a> {
     /// For values of the minimal set, as [`bounds`].
     pub fn new(model: &'a Model, parameters: Option<&'a [f64]>) -> Self {
-        Bounder { model, parameters, links: None, factors: OnceLock::new() }
+        let (factors, loaded, task) = Default::default();
+        Bounder { model, parameters, links: None, factors, loaded, task }
     }
 
     /// With the same values in the full set: each link is then known as a body, and more arms have bounds of
@@ -94,10 +125,13 @@ impl<'a> Bounder<'a> {
         if let Some(missing) = limits.missing(built.arguments()) {
             return Err(missing);
         }
-        let facts = match divisor(built.function) {
-            Some(Divisor::Pivots) => Some(self.facts(built, &limits)?),
-            Some(Divisor::Task) => return Err(self.why_task_unbounded()),
-            Some(Divisor::Loaded) => return Err(LOADED.to_string()),
+        let divisor = divisor(built.function);
+        let task = match divisor {
+            Some(Divisor::Task) => Some(self.task(&limits)?),
+            _ => None,
+        };
+        let facts = match divisor {
+            Some(divisor) => Some(self.facts(built, divisor, task, &limits)?),
             None => None,
         };
         let programs: Option<Vec<Program>> = (0..built.outputs.len())
@@ -107,7 +141,8 @@ impl<'a> Bounder<'a> {
         let operations: usize = programs.iter().map(Program::len).sum();
         let effort = if facts.is_some() { SOLVED } else { EFFORT[usize::from(parameters.is_some())] };
         let evaluations = (effort / operations.max(1)).min(MOST);
-        let mut bounds = Bounds { single: Vec::new(), double: Vec::new() };
+        let poses = task.map(|task| task.poses.clone());
+        let mut bounds = Bounds { single: Vec::new(), double: Vec::new(), poses };
         for program in &programs {
             let ranges: Option<Vec<_>> = program.variables.iter().map(|v| limits.range(*v)).collect();
             let splits: Vec<bool> = program.variables.iter().map(|v| v.0 != Argument::Parameters).collect();
@@ -120,19 +155,61 @@ impl<'a> Bounder<'a> {
     }
 
     /// What is known of a function that divides by pivots of B.
-    fn facts(&self, built: &FunctionGraph, limits: &Limits<'_>) -> Result<Facts<'_>, String> {
+    fn facts<'f>(
+        &'f self,
+        built: &FunctionGraph,
+        divisor: Divisor,
+        task: Option<&'f Task>,
+        limits: &Limits<'_>,
+    ) -> Result<Facts<'f>, String> {
         let set = self.model.set(SetKind::Minimal).map_err(|e| e.to_string())?;
         if built.parameters != set.parameters.len() {
             return Err("B is proven positive for the minimal set alone".to_string());
         }
-        let factors = self.factors.get_or_init(|| self.factors(limits)).as_ref().map_err(Clone::clone)?;
-        Facts::new(self.model, built, factors).ok_or_else(|| "its solve is not recognised".to_string())
+        let factors = match divisor {
+            Divisor::Loaded => self.loaded(limits)?,
+            Divisor::Pivots | Divisor::Task => self.unloaded(limits)?,
+        };
+        Facts::new(self.model, built, factors, task.map(|task| &task.factors))
+            .ok_or_else(|| "its solve is not recognised".to_string())
+    }
+
+    fn unloaded(&self, limits: &Limits<'_>) -> Result<&Factors, String> {
+        self.factors.get_or_init(|| self.factors(limits)).as_ref().map_err(Clone::clone)
+    }
+
+    fn loaded(&self, limits: &Limits<'_>) -> Result<&Factors, String> {
+        let loaded = || {
+            let most = self.matrix(Function::MassMatrix, limits)?.largest_diagonal();
+            let most = most.ok_or("B(q) has no bound")?;
+            payload::factors(self.unloaded(limits)?, &most, &self.jacobian(limits)?)
+                .ok_or_else(|| "B(q) has no bound".to_string())
+        };
+        self.loaded.get_or_init(loaded).as_ref().map_err(Clone::clone)
+    }
+
+    fn task(&self, limits: &Limits<'_>) -> Result<&Task, String> {
+        let task = || {
+            let values = self.parameters.ok_or(ANY)?;
+            Task::new(self.model, values, &self.jacobian(limits)?, self.unloaded(limits)?)
+        };
+        self.task.get_or_init(task).as_ref().map_err(Clone::clone)
+    }
+
+    /// The largest sizes of J's entries.
+    fn jacobian(&self, limits: &Limits<'_>) -> Result<Vec<f64>, String> {
+        let sizes = self.matrix(Function::Jacobian, limits)?.largest_sizes();
+        sizes.ok_or_else(|| "the Jacobian has no bound".to_string())
+    }
+
+    fn matrix(&self, function: Function, limits: &Limits<'_>) -> Result<PosedMatrix, String> {
+        let built = self.model.function(function, SetKind::Minimal).map_err(|e| e.to_string())?;
+        PosedMatrix::new(self.model, &built, limits).ok_or_else(|| "a parameter has no value".to_string())
     }
 
     fn factors(&self, limits: &Limits<'_>) -> Result<Factors, String> {
         let Bounder { model, parameters: Some(values), .. } = *self else { return Err(ANY.to_string()) };
-        let built = model.function(Function::MassMatrix, SetKind::Minimal).map_err(|e| e.to_string())?;
-        let mass = MassMatrix::new(model, &built, limits).ok_or("a parameter has no value")?;
+        let mass = self.matrix(Function::MassMatrix, limits)?;
         if let Some(rough) = mass.factors(ROUGH, BOXES) {
             return Ok(mass.factors(FINE, BOXES).unwrap_or(rough));
         }
@@ -141,7 +218,7 @@ impl<'a> Bounder<'a> {
                 .map_err(|why| format!("nor do the links as bodies prove it: {why}")),
             _ => Err("values of every link's ten parameters may prove it".to_string()),
         };
-        of_bodies.map_err(|why| match self.worst(Function::MassMatrix, values) {
+        of_bodies.map_err(|why| match self.worst(values) {
             Ok((smallest, pose)) if smallest <= 0.0 => format!(
                 "B(q) is not positive definite with these values: its smallest eigenvalue is {smallest:.2e} \
                  at q = {pose}"
@@ -154,23 +231,12 @@ impl<'a> Bounder<'a> {
         })
     }
 
-    /// The smallest eigenvalue of a symmetric matrix, and at which pose.
-    fn worst(&self, function: Function, values: &[f64]) -> Result<(f64, String), String> {
-        let found = consistency::smallest_eigenvalue(self.model, function, SetKind::Minimal, values);
+    /// The smallest eigenvalue of B, and at which pose.
+    fn worst(&self, values: &[f64]) -> Result<(f64, String), String> {
+        let found = consistency::smallest_eigenvalue(self.model, SetKind::Minimal, values);
         let (smallest, pose) = found.map_err(|e| e.to_string())?;
         let pose: Vec<String> = pose.iter().map(|q| format!("{q:.3}")).collect();
         Ok((smallest, format!("[{}]", pose.join(", "))))
-    }
-
-    fn why_task_unbounded(&self) -> String {
-        let Some(values) = self.parameters else { return ANY.to_string() };
-        match self.worst(Function::TaskInertiaInverse, values) {
-            Ok((smallest, pose)) => format!(
-                "the Jacobian is not proven to have rank six within the limits: the smallest eigenvalue of \
-                 Λ⁻¹ that was found is {smallest:.2e} at q = {pose}"
-            ),
-            Err(why) => why,
-        }
     }
 }
 
@@ -202,9 +268,6 @@ fn divisor(function: Function) -> Option<Divisor> {
 /// Why there is no bound without values.
 const ANY: &str =
     "with parameters within ±1 SI unit B(q) need not be positive definite: --values gives those of an arm";
-
-/// Why there is no bound with a payload.
-const LOADED: &str = "with a payload within ±1 SI unit B(q) need not be positive definite";
 
 /// Norms of E that parts of the poses have at most: where that is enough to prove B positive, and what close
 /// bounds need.
