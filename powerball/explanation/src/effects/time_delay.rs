@@ -124,7 +124,7 @@ pub(crate) fn later(x: &[f64], by: f64) -> Vec<f64> {
     let weight = |m: isize| -> f64 {
         near().filter(|other| *other != m).map(|other| (part - other as f64) / (m - other) as f64).product()
     };
-    let weights: Vec<(isize, f64)> = near().map(|m| (m - whole, weight(m))).collect();
+    let weights: Vec<(isize, f64)> = near().map(|m| (m.saturating_sub(whole), weight(m))).collect();
     let at = |k: usize| {
         let sample = |(m, w): &(isize, f64)| w * x[k.saturating_add_signed(*m).min(last)];
         weights.iter().map(sample).sum()
