@@ -1,4 +1,5 @@
-//! The probability of a name as a curve, fitted to one half of the cases and judged on the other.
+//! The probability of a name as a curve, fitted to one half of the drawn arms and judged on the other, and on
+//! the names of every other set of cases.
 //!
 //! Logistic regression on what `explain` knows of a name (D. R. Cox, "The regression analysis of binary
 //! sequences", 1958), by Newton's method with a small ridge.
@@ -8,6 +9,7 @@ use super::reliability::wilson;
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 use powerball::explanation::explain::{Evidence, FEATURES};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
@@ -21,7 +23,7 @@ const RIDGE: f64 = 1.0 / 9.0;
 /// Where the names come from and go to.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// Results of `study`, whose names are written to the table first
+    /// Results of `study`, whose names are written to the table first; those of other sets stay in it
     #[arg(long)]
     results: Option<PathBuf>,
     /// The table of names
@@ -37,9 +39,13 @@ struct Case {
     right: bool,
 }
 
-const HEAD: &str = "case,effect,right,margin,alike,own_share,leftover,unattributed,fitted_time";
+const HEAD: &str = "set,case,effect,right,margin,alike,own_share,leftover,unattributed,fitted_time";
 
-/// Prints the curve that fits the names of every other case, and how it does on the others.
+/// The set to which the curve is fitted: effects on arms drawn by lot.
+const FITTED: &str = "drawn";
+
+/// Prints the curve that fits the names of every other drawn case, how it does on the others, and how the
+/// curve in use does on other sets.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let failed = |e: std::io::Error| format!("{}: {e}", arguments.names.display());
     if let Some(results) = &arguments.results {
@@ -48,16 +54,26 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
             let number = outcome.case.rsplit('/').next().and_then(|seed| seed.parse::<u64>().ok());
             (outcome.table.clone(), number)
         });
-        let lines = outcomes.iter().flat_map(|o| o.named.iter().filter_map(|named| line(o, named)));
-        let table: Vec<String> = std::iter::once(HEAD.to_string()).chain(lines).collect();
+        let lines: Vec<String> =
+            outcomes.iter().flat_map(|o| o.named.iter().filter_map(|named| line(o, named))).collect();
+        let set = |line: &str| line.split(',').next().unwrap_or_default().to_string();
+        let replaced: BTreeSet<String> = lines.iter().map(|line| set(line)).collect();
+        let old = fs::read_to_string(&arguments.names).unwrap_or_default();
+        let kept = old.lines().skip(1).filter(|line| !replaced.contains(&set(line))).map(String::from);
+        let table: Vec<String> = std::iter::once(HEAD.to_string()).chain(kept).chain(lines).collect();
         fs::write(&arguments.names, table.join("\n") + "\n").map_err(failed)?;
     }
     let text = fs::read_to_string(&arguments.names).map_err(failed)?;
     let mut halves: [Vec<Case>; 2] = [Vec::new(), Vec::new()];
+    let mut others: BTreeMap<String, Vec<Case>> = BTreeMap::new();
     let (mut last, mut half) = (String::new(), 0);
     for (k, line) in text.lines().enumerate().skip(1) {
-        let (name, case) =
+        let (set, name, case) =
             case(line).ok_or_else(|| format!("{}: line {}: no name", arguments.names.display(), k + 1))?;
+        if set != FITTED {
+            others.entry(set.to_string()).or_default().push(case);
+            continue;
+        }
         // The names of one arm are of one half.
         if name != last {
             (half, last) = (1 - half, name.to_string());
@@ -66,7 +82,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     }
     let [judge, fit] = halves;
     print!("{}", curve(&fit, &judge));
+    let in_use = |case: &Case| case.evidence.probability();
+    for (set, cases) in &others {
+        println!("\nthe curve in use on the {} names of the set {set}:\n", cases.len());
+        print!("{}\nBrier score {:.4}\n", reliability(cases, &in_use), brier(cases, &in_use));
+    }
     Ok(())
+}
+
+/// The set of a case: what is put into measured logs is of one set at any size.
+fn set(outcome: &Outcome) -> &str {
+    outcome.table.split('-').next().unwrap_or_default()
 }
 
 fn line(outcome: &Outcome, named: &Named) -> Option<String> {
@@ -76,19 +102,20 @@ fn line(outcome: &Outcome, named: &Named) -> Option<String> {
     let Named { effect, margin, own_share, leftover, .. } = named;
     let (own_share, time) = ((*own_share)?, outcome.fitted_time);
     Some(format!(
-        "{},{effect},{right},{margin:.4},{alike},{own_share:.4},{leftover:.4},{unattributed},{time:.1}",
+        "{},{},{effect},{right},{margin:.4},{alike},{own_share:.4},{leftover:.4},{unattributed},{time:.1}",
+        set(outcome),
         outcome.case
     ))
 }
 
-/// The case of a line, and what the curve reads of it.
-fn case(line: &str) -> Option<(&str, Case)> {
+/// The set and the case of a line, and what the curve reads of it.
+fn case(line: &str) -> Option<(&str, &str, Case)> {
     let cells: Vec<&str> = line.split(',').collect();
-    let [name, _, right, margin, alike, _, leftover, ..] = cells[..] else { return None };
+    let [set, name, _, right, margin, alike, _, leftover, unattributed, ..] = cells[..] else { return None };
     let evidence =
         Evidence { margin: margin.parse().ok()?, alike: alike == "1", leftover: leftover.parse().ok()? };
-    let unattributed = *cells.get(7)? == "1";
-    Some((name, Case { evidence, features: evidence.features(), unattributed, right: right == "1" }))
+    let [unattributed, right] = [unattributed, right].map(|flag| flag == "1");
+    Some((set, name, Case { evidence, features: evidence.features(), unattributed, right }))
 }
 
 /// The coefficients, and how the curve that they make does on names that were not fitted, compared with three

@@ -261,9 +261,8 @@ impl TorqueModel {
         for j in (0..n).filter(|j| self.additions.log_changes.late(*j) != 0.0) {
             let shift = self.additions.log_changes.late(j) * recording.rate;
             let own: Vec<f64> = torque.iter().skip(j).step_by(n).copied().collect();
-            for (k, value) in torque.iter_mut().skip(j).step_by(n).enumerate() {
-                *value = time_delay::at(&own, k as f64 - shift);
-            }
+            let late = time_delay::later(&own, shift);
+            torque.iter_mut().skip(j).step_by(n).zip(late).for_each(|(value, late)| *value = late);
         }
         torque
     }

@@ -267,7 +267,7 @@ impl<'a> Stretch<'a> {
         names.extend(self.friction(&context, guess));
         names.extend(self.offset(&context, guess));
         names.extend(self.delay(&context, guess));
-        names.retain(|named| named.score > 0.0);
+        names.retain(|named| named.score >= self.rule.least_score);
         names.sort_by(|a, b| b.score.total_cmp(&a.score));
         for named in &mut names {
             let by_joint = self.by_joint(&named.columns, &named.coefficients, &named.edges());
