@@ -68,7 +68,7 @@ pub fn decide(
                 first.name
             ),
         )
-    } else if share < rule.same_model && own_a != own_b {
+    } else if share < rule.little && own_a != own_b {
         let simpler = if own_a < own_b { a } else { b };
         let more = if own_a < own_b { b } else { a };
         (

@@ -14,7 +14,7 @@ use crate::effects::position_ripple::{BINS, PositionRipple, Settings, Spectrum};
 use crate::effects::{Candidate, Context, Effect};
 use chacha20::ChaCha8Rng;
 use powerball_controller::JointNumber;
-use powerball_identification::estimate::distribution::f_tail;
+use powerball_identification::estimate::distribution::{MANY, f_tail};
 use powerball_identification::estimate::residual_stats;
 use powerball_logs::parallel;
 use powerball_logs::regression::{Data, Recording};
@@ -106,7 +106,7 @@ fn search(study: &Study<'_>, model: &Model) -> Vec<Ripple> {
             if gain.min(wave.gain(&fitted[j])) < rule.least_gain {
                 break;
             }
-            let chance = chance.get_or_insert_with(|| heights_by_chance(&fitted, rule.searched_surrogates));
+            let chance = chance.get_or_insert_with(|| heights_by_chance(&fitted, rule.searched_surrogates()));
             let above = chance.iter().filter(|height| **height >= peak.height).count();
             let p_value = (1 + above) as f64 / (1 + chance.len()) as f64;
             if p_value > rule.family_wise {
@@ -378,9 +378,6 @@ impl Wave {
         products(traces, self.order).iter().zip(self.coefficients).map(|(p, c)| p * c).sum()
     }
 }
-
-/// Degrees of freedom that are as good as any number of them.
-const MANY: f64 = 1e6;
 
 /// Products of the residual above the band with cos(k·q) and sin(k·q).
 fn products(traces: &[Trace], order: f64) -> [f64; 2] {

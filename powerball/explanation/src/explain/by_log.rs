@@ -81,7 +81,7 @@ pub(crate) fn changes(
             }
             let others: Vec<f64> =
                 (0..logs.len()).filter(|k| *k != l).filter_map(|k| Some(of(t, k)?.0)).collect();
-            let share = share(&together, (side, log), &logs, &tried[t].joints, &asked, rule.odd_log)?;
+            let share = share(&together, (side, log), &logs, &tried[t].joints, &asked, rule.unlike)?;
             let enough = share >= 1.0 - rule.max_unexplained
                 && by_chance(&together, &asked) * places.len() as f64 <= rule.family_wise
                 && stands_out(asked.theta, &others);
@@ -141,7 +141,7 @@ fn friction(context: &Context<'_>, model: &Model, joint: JointNumber) -> Column 
 }
 
 /// The share of what the squared error of some joints is larger in a log than in any other one that goes with
-/// a column; `None` where it is not `odd_log` times as large. Logs of other paths are predicted more or less
+/// a column; `None` where it is not `odd` times as large. Logs of other paths are predicted more or less
 /// well, and the best fit in one of them only resembles that.
 fn share(
     together: &Together<'_>,

@@ -112,15 +112,14 @@ fn most_promising(groups: &mut [Group], tester: &Tester<'_>) -> Option<usize> {
 fn simplest_as_good(groups: &mut [Group], best: usize, tester: &Tester<'_>) -> usize {
     let rule = tester.study.rule();
     let top = groups[best].potential();
-    let least = top - (rule.as_good * top).max(rule.as_good_score);
     let mut chosen = best;
     for g in 0..groups.len() {
         let simpler = groups[g].columns() < groups[chosen].columns();
-        if g == chosen || groups[g].potential() < least || !simpler {
+        if g == chosen || !rule.is_as_good(top, groups[g].potential()) || !simpler {
             continue;
         }
         tester.test(&mut groups[g]);
-        if groups[g].potential() >= least && groups[g].columns() < groups[chosen].columns() {
+        if rule.is_as_good(top, groups[g].potential()) && groups[g].columns() < groups[chosen].columns() {
             chosen = g;
         }
     }

@@ -196,7 +196,7 @@ fn best<'l>(
     tried.sort_by(|a, b| a.2.total_cmp(&b.2));
     let mut tried = tried.into_iter();
     let (best, k, left, p_value) = tried.next()?;
-    let is_sure = left <= 1.0 - rule.large_gain || p_value <= level;
+    let is_sure = left <= 1.0 - rule.large_gain() || p_value <= level;
     if left > 1.0 - rule.least_gain || !is_sure || candidates[k].ends_at_bound(&best) {
         return None;
     }

@@ -198,7 +198,7 @@ impl Judged<'_> {
         }
         differs.sort_by(|a, b| a.start_time.total_cmp(&b.start_time));
         let error_ratio = usual.filter(|usual| *usual > 0.0).map(|usual| after / usual);
-        let like_the_others = differs.is_empty() && error_ratio.is_none_or(|ratio| ratio <= rule.odd_log);
+        let like_the_others = differs.is_empty() && error_ratio.is_none_or(|ratio| ratio <= rule.unlike);
         LogResult { log, like_the_others, error_ratio, differs }
     }
 }

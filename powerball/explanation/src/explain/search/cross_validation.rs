@@ -136,8 +136,8 @@ fn correlation(screen: &Screen<'_>, trial: &Trial, other: &[f64]) -> f64 {
 impl CrossValidated {
     /// Whether it is enough; `tests` counts what was tried.
     pub(crate) fn is_enough(&self, rule: &crate::rule::Rule, tests: f64) -> bool {
-        self.gain >= rule.large_gain
+        self.gain >= rule.large_gain()
             && self.p_value * tests <= rule.family_wise
-            && self.correlation >= rule.least_correlation
+            && self.correlation >= rule.most
     }
 }

@@ -325,13 +325,13 @@ pub(crate) fn refusal(rule: &Rule, evidence: &Evidence, tests: f64, local: bool)
     let folds = &evidence.fold_gains;
     let good = folds.iter().filter(|g| **g > 0.0).count();
     let mean = folds.iter().sum::<f64>() / folds.len().max(1) as f64;
-    if (good as f64) < rule.folds_that_must_gain * folds.len() as f64 {
+    if (good as f64) < rule.nearly_all * folds.len() as f64 {
         return Some(format!("the held-out error falls in {good} of {} folds only", folds.len()));
     }
     if mean < rule.least_gain {
         return Some(format!("the held-out squared error falls by {:.1} % only", 100.0 * mean));
     }
-    if let Some(worst) = folds.iter().copied().reduce(f64::min).filter(|w| *w < rule.worst_fold) {
+    if let Some(worst) = folds.iter().copied().reduce(f64::min).filter(|w| *w < -rule.negligible) {
         return Some(format!("one held-out fold is {:.0} % worse", -100.0 * worst));
     }
     // A push is where errors are larger than elsewhere, and explains that.

@@ -170,8 +170,7 @@ fn compatible(screen: &Screen<'_>, mut members: Vec<Member>) -> Vec<Member> {
     };
     let (single, wide) = (choose(&|m| m.candidate.joints.len() == 1), choose(&|_| true));
     // One cause for all joints is preferred to one for each.
-    let as_good = single.0 - (rule.as_good * single.0).max(rule.as_good_score);
-    let kept = if as_good > wide.0 { single.1 } else { wide.1 };
+    let kept = if rule.is_as_good(single.0, wide.0) { wide.1 } else { single.1 };
     let mut at = 0;
     members.retain(|_| {
         at += 1;
@@ -276,7 +275,7 @@ fn only_corrects(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<
     let (rule, effect) = (screen.context.rule, member.candidate.effect());
     // An event corrects nothing that lasts; but an event next to the beginning of another one corrects its
     // time.
-    let baseline = |a: &Accepted| begins_with(&a.candidate, &member.candidate, rule.same_event);
+    let baseline = |a: &Accepted| begins_with(&a.candidate, &member.candidate, rule.longest_block);
     let lasting: Vec<&Accepted> =
         model.accepted.iter().filter(|a| a.candidate.windows.is_empty() || baseline(a)).collect();
     let mut corrected = None;
@@ -284,7 +283,7 @@ fn only_corrects(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<
     for (joint, gain) in screen.gains(&member.trial, &member.candidate.joints) {
         let small = lasting.iter().find(|a| {
             let alike = a.effect().class() == effect.class() && a.effect() != effect;
-            let share = if alike { rule.only_corrects_class } else { rule.only_corrects_any };
+            let share = if alike { rule.only_corrects_class } else { rule.negligible };
             let explained = a.explained.get(joint.index()).copied().unwrap_or(0.0);
             gain < share * explained * model.fit.weights[joint.index()]
         });
@@ -369,7 +368,7 @@ impl Judge<'_> {
     ) -> Option<String> {
         let (rule, local) = (self.study.rule(), !candidate.windows.is_empty());
         let refusal = refusal(rule, evidence, self.tests, local)?;
-        if local || evidence.score < rule.least_score || evidence.validation_gain < rule.large_gain {
+        if local || evidence.score < rule.least_score || evidence.validation_gain < rule.large_gain() {
             return Some(refusal);
         }
         let cross_validation = self.cross_validation.get_or_init(self.swap);

@@ -91,7 +91,7 @@ fn draw(screen: &Screen<'_>, trials: &[&Trial], count: usize, seed: u64) -> Vec<
 pub(crate) fn level_of_search(context: &Context<'_>, effect: &dyn Effect, seed: u64) -> f64 {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let shift = |rng: &mut ChaCha8Rng| Shift { fraction: rng.random_range(0.15..0.85), signs: Vec::new() };
-    let shifts: Vec<Shift> = (0..context.rule.searched_surrogates).map(|_| shift(&mut rng)).collect();
+    let shifts: Vec<Shift> = (0..context.rule.searched_surrogates()).map(|_| shift(&mut rng)).collect();
     let scores = parallel::map(&shifts, |shift| {
         let residual: Signals = (context.residual.iter().enumerate())
             .map(|(j, values)| rotated(values, &context.data.joints[j].rows, shift))

@@ -39,7 +39,7 @@ fn same_path(rule: &Rule, a: &Recording, b: &Recording) -> bool {
             own[1] += y * y;
         }
     }
-    common > rule.same_path * (own[0] * own[1]).sqrt()
+    common > (1.0 - rule.little) * (own[0] * own[1]).sqrt()
 }
 
 // On a repeated path: one multibody model for all joints (the joint fit), or inertial parameters for each
@@ -59,7 +59,7 @@ pub(crate) fn predicts_better(model: (&Study<'_>, &Model), rival: (&Study<'_>, &
             rows += n;
         }
     }
-    log_ratio < rows * (1.0 - model.0.rule().clear_change).ln()
+    log_ratio < rows * (1.0 - model.0.rule().little).ln()
 }
 
 // When logs were recorded, if their times do not show it.
@@ -169,7 +169,7 @@ fn same_start(
     let reach = |j: usize| {
         let positions = data.recordings.iter().chain(other.recordings.iter()).flat_map(|r| r.position(j));
         let (low, high) = positions.fold((f64::MAX, f64::MIN), |(l, h): (f64, f64), q| (l.min(q), h.max(q)));
-        rule.same_start * (high - low).max(1e-9)
+        rule.negligible * (high - low).max(1e-9)
     };
     let reach: Vec<f64> = (0..data.dof()).map(reach).collect();
     move |a, b| reach.iter().enumerate().all(|(j, reach)| (a.q[j] - b.q[j]).abs() <= *reach)

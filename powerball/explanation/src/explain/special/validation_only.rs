@@ -84,7 +84,7 @@ pub(crate) fn validation_only_effects<'a>(
     let rule = &options.rule;
     let Baseline { validation, base, .. } = &baseline;
     let residual = base.residual_on(validation, &[]);
-    let odd = |log: usize| oddness(base, validation, &residual, log) > rule.odd_log;
+    let odd = |log: usize| oddness(base, validation, &residual, log) > rule.unlike;
     if !(0..validation.logs.len()).any(odd) {
         return Ok((baseline, Vec::new()));
     }
@@ -120,7 +120,7 @@ pub(crate) fn validation_only_effects<'a>(
     let Baseline { data, validation, base } = &baseline;
     let pushed = pooled.seen.iter().any(short) && {
         let (better, left) = with_zeros(rule, base, (data, validation));
-        (0..validation.logs.len()).any(|log| oddness(&better, validation, &left, log) > rule.odd_log)
+        (0..validation.logs.len()).any(|log| oddness(&better, validation, &left, log) > rule.unlike)
     };
     let new = |seen: &&Seen| {
         let in_validation = seen.candidate.windows.iter().all(|w| validation.logs.contains(&w.log));
@@ -377,5 +377,5 @@ fn makes_it_odd(
         |residual: &[Vec<f64>]| -> f64 { logs().map(|log| oddness(base, other, residual, log) - 1.0).sum() };
     let little = excess(&left) <= rule.max_unexplained * excess(residual);
     let (after, before) = (left.squares(), residual.squares());
-    little && !after.iter().zip(before).any(|(after, before)| *after > (1.0 + rule.clear_change) * before)
+    little && !after.iter().zip(before).any(|(after, before)| *after > (1.0 + rule.little) * before)
 }
