@@ -1,5 +1,6 @@
 //! Every threshold that decides what an explanation says, with its reason.
 
+use powerball_identification::evidence::penalty;
 use serde::{Deserialize, Serialize};
 
 /// The thresholds of the rule that accepts, names or refuses effects.
@@ -201,6 +202,11 @@ impl Rule {
     /// The share by which a squared error falls where its rms falls by [`little`](Self::little).
     pub(crate) fn large_gain(&self) -> f64 {
         1.0 - (1.0 - self.little).powi(2)
+    }
+
+    /// The penalty of a score: for coefficients, and for having searched.
+    pub(crate) fn penalty(&self, coefficients: usize, searched: f64) -> f64 {
+        penalty(self.per_coefficient, coefficients, searched)
     }
 
     /// Whether one score leads another by too little for a choice between them.

@@ -10,7 +10,7 @@
 use crate::explain::{Hypothesis, Open};
 use crate::options::{ExplainError, ExplainOptions};
 use powerball_identification::estimate::Folds;
-use powerball_identification::estimate::blocks::p_of_sum;
+use powerball_identification::evidence::p_of_sum;
 use powerball_logs::log::Log;
 use powerball_logs::regression::{Data, RigidArm, Signals};
 

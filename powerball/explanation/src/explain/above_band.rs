@@ -8,7 +8,6 @@
 
 use super::comparison::{Comparison, Step, relative_score};
 use super::model::{Accepted, Model, Origin};
-use super::search::penalty;
 use super::study::Study;
 use crate::effects::position_ripple::{BINS, PositionRipple, Settings, Spectrum};
 use crate::effects::{Candidate, Context, Effect};
@@ -114,7 +113,7 @@ fn search(study: &Study<'_>, model: &Model) -> Vec<Ripple> {
             }
             let coefficients = wave.coefficients;
             fitted[j].iter_mut().for_each(|trace| trace.take_out(order, coefficients));
-            let score = 2.0 * peak.height - penalty(rule, 2, BINS as f64 / 2.0);
+            let score = 2.0 * peak.height - rule.penalty(2, BINS as f64 / 2.0);
             let ripple = Ripple { candidate, coefficients: coefficients.to_vec(), p_value, gain, score };
             if raises_error(study, model, &ripple) {
                 break;

@@ -8,7 +8,7 @@ use super::study::Study;
 use crate::effects::{self, Context, Settings, temperature};
 use faer::Mat;
 use powerball_controller::JointNumber;
-use powerball_identification::estimate::blocks::p_of_coefficients;
+use powerball_identification::evidence::p_of_coefficients;
 use powerball_identification::estimate::{Design, Folds, Gram, Solver, friction_columns};
 use powerball_logs::parallel;
 use powerball_logs::regression::{Column, Data, Signals};

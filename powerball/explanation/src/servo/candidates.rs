@@ -4,7 +4,7 @@
 use super::result::{ServoEffect, ServoRival};
 use crate::rule::Rule;
 use powerball_controller::JointNumber;
-use powerball_identification::estimate::blocks::p_of_sum;
+use powerball_identification::evidence::p_of_sum;
 use powerball_identification::servo::constants::Constant;
 use powerball_identification::servo::fit::{Free, errors, fit, objective};
 use powerball_identification::servo::{Joint, Problem, Role, ServoArm};

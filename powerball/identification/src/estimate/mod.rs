@@ -1,7 +1,6 @@
 //! Weighted least squares in the minimal set, friction shapes included, with honest standard errors.
 
 mod band;
-pub mod blocks;
 mod bounded;
 mod consistent;
 mod design;

@@ -2,15 +2,14 @@
 //!
 //! The module also decides whether the evidence for a candidate is sufficient.
 
-use super::screen::{Screen, Trial, fold_gains};
+use super::screen::Screen;
 use crate::effects::Candidate;
 use crate::rule::Rule;
-use faer::Mat;
 use powerball_controller::JointNumber;
-use powerball_identification::estimate::blocks::p_of_coefficients;
 use powerball_identification::estimate::distribution::f_tail;
-use powerball_identification::estimate::{Design, Folds, MEAN_OVER, NormalEquations, variance_inflation};
-use powerball_logs::regression::{Block, Column, Data, Signals};
+use powerball_identification::estimate::{Folds, MEAN_OVER, NormalEquations, variance_inflation};
+use powerball_identification::evidence::{Rows, Trial, gain_on};
+use powerball_logs::regression::Column;
 use powerball_logs::vector::dot;
 
 /// The evidence for one candidate.
@@ -60,17 +59,6 @@ impl Extent {
     }
 }
 
-/// The validation set, prepared for one base model.
-#[derive(Debug)]
-pub(crate) struct Validation<'p> {
-    /// The data of the validation set.
-    pub(crate) data: &'p Data<'p>,
-    /// The base's columns on it.
-    pub(crate) design: Design,
-    /// Residual of the base on it.
-    pub(crate) residual: Signals,
-}
-
 /// Gathers the evidence for a trial. `validation` holds the validation set and the candidate's columns there.
 #[must_use]
 pub(crate) fn evidence(
@@ -79,78 +67,31 @@ pub(crate) fn evidence(
     joints: &[JointNumber],
     folds: &Folds,
     extent: Extent,
-    validation: Option<(&Validation<'_>, &[Column])>,
+    validation: Option<(&Rows<'_>, &[Column])>,
 ) -> Evidence {
+    let base = &screen.base;
     let (p_value, fold_gains, event_left) = match extent {
         Extent::Short(seconds) => {
-            let columns = screen.residualised(trial);
-            let after = left(screen, trial, &columns);
+            let after = base.left(trial);
             let by_chance = by_chance(screen, trial, &after, seconds);
-            (by_chance, event_gains(screen, trial, &columns), Some(event_left(screen, trial, &after)))
+            let gains = event_gains(screen, trial, &base.freed(trial));
+            (by_chance, gains, Some(event_left(screen, trial, &after)))
         }
         _ => {
             let local = extent != Extent::Everywhere;
-            let p_value = wald(screen, trial, &screen.context.data.blocks);
-            (p_value, fold_gains(screen, trial, joints, folds, local), None)
+            let p_value = base.p_value(trial, &base.rows.data.blocks);
+            (p_value, screen.folds.gains(base, trial, joints, folds, local), None)
         }
     };
+    let on_validation =
+        |(set, columns): (&Rows<'_>, &[Column])| gain_on(set, (trial, columns), base.weights, joints);
     Evidence {
         event_left,
         score: trial.score,
         p_value,
         fold_gains,
-        validation_gain: validation
-            .map_or(0.0, |(set, columns)| validation_gain(screen, trial, joints, set, columns)),
+        validation_gain: validation.map_or(0.0, on_validation),
     }
-}
-
-/// The test of a trial's coefficients between blocks.
-pub(crate) fn wald(screen: &Screen<'_>, trial: &Trial, blocks: &[Block]) -> f64 {
-    let fit = screen.context.fit;
-    let k = trial.columns.len();
-    let columns = screen.residualised(trial);
-    let mut square = Mat::<f64>::zeros(k, k);
-    let after = left(screen, trial, &columns);
-    let mut scores = Vec::new();
-    for block in blocks {
-        let mut score = vec![0.0; k];
-        let mut touched = false;
-        for (j, rows) in block.rows.iter().enumerate() {
-            let w = fit.weights[j];
-            if rows.is_empty() || w == 0.0 {
-                continue;
-            }
-            for a in 0..k {
-                let own = &columns[j][a][rows.clone()];
-                score[a] += w * dot(own, &after[j][rows.clone()]);
-                for b in 0..=a {
-                    square[(a, b)] += w * dot(own, &columns[j][b][rows.clone()]);
-                }
-            }
-            touched = true;
-        }
-        if touched {
-            scores.push(score);
-        }
-    }
-    for a in 0..k {
-        for b in 0..a {
-            square[(b, a)] = square[(a, b)];
-        }
-    }
-    p_of_coefficients(&trial.theta, &square, &scores)
-}
-
-/// The residual of a trial, given its columns without the base's shares.
-pub(super) fn left(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]) -> Signals {
-    let of = |(columns, residual): (&Vec<Vec<f64>>, &Vec<f64>)| {
-        let mut e = residual.clone();
-        for (column, theta) in columns.iter().zip(&trial.theta) {
-            e.iter_mut().zip(column).for_each(|(e, c)| *e -= theta * c);
-        }
-        e
-    };
-    columns.iter().zip(screen.context.residual).map(of).collect()
 }
 
 /// The probability of the gain by chance, for an event of some seconds, too short for blocks. Gains are over
@@ -229,83 +170,6 @@ fn event_left(screen: &Screen<'_>, trial: &Trial, after: &[Vec<f64>]) -> f64 {
 
 fn mean_square(x: &[f64]) -> f64 {
     dot(x, x) / x.len().max(1) as f64
-}
-
-/// The addition of a trial to the prediction on the validation set, by joint and row, N·m.
-fn added(
-    screen: &Screen<'_>,
-    trial: &Trial,
-    validation: &Validation<'_>,
-    columns: &[Column],
-) -> Vec<Vec<f64>> {
-    let fit = screen.context.fit;
-    let mut shift = vec![0.0; fit.design.size];
-    for (base, theta) in trial.base.iter().zip(&trial.theta) {
-        shift.iter_mut().zip(base).for_each(|(s, b)| *s -= theta * b);
-    }
-    let of = |j: usize| {
-        let mut moved = validation.design.predict(j, &shift);
-        for (column, theta) in columns.iter().zip(&trial.theta) {
-            if let Some(values) = column.at(j) {
-                moved.iter_mut().zip(values).for_each(|(m, v)| *m += theta * v);
-            }
-        }
-        moved
-    };
-    (0..fit.design.dof()).map(of).collect()
-}
-
-/// The mean over joints of the logarithm of the squared error on the validation set, with a trial less
-/// without it: negative if the trial predicts better. It does not depend on the units or sizes of the joints.
-pub(crate) fn log_change(
-    screen: &Screen<'_>,
-    trial: &Trial,
-    validation: &Validation<'_>,
-    columns: &[Column],
-) -> f64 {
-    let moved = added(screen, trial, validation, columns);
-    let (mut sum, mut joints) = (0.0, 0.0);
-    for (residual, moved) in validation.residual.iter().zip(&moved) {
-        let before = dot(residual, residual);
-        let after = before - 2.0 * dot(residual, moved) + dot(moved, moved);
-        if before > 0.0 && after > 0.0 {
-            sum += (after / before).ln();
-            joints += 1.0;
-        }
-    }
-    if joints > 0.0 { sum / joints } else { 0.0 }
-}
-
-/// The share of the squared error of `joints` that a trial takes away on the validation set: the median over
-/// its logs.
-pub(crate) fn validation_gain(
-    screen: &Screen<'_>,
-    trial: &Trial,
-    joints: &[JointNumber],
-    validation: &Validation<'_>,
-    columns: &[Column],
-) -> f64 {
-    let fit = screen.context.fit;
-    let mut change = vec![0.0; validation.data.logs.len()];
-    let mut scale = vec![0.0; validation.data.logs.len()];
-    for (j, moved) in added(screen, trial, validation, columns).iter().enumerate() {
-        for (recording, rows) in validation.data.recordings.iter().zip(&validation.data.joints[j].rows) {
-            let (r, m) = (&validation.residual[j][rows.clone()], &moved[rows.clone()]);
-            change[recording.log] += fit.weights[j] * (2.0 * dot(r, m) - dot(m, m));
-            if joints.contains(&JointNumber::from_index(j)) {
-                scale[recording.log] += fit.weights[j] * dot(r, r);
-            }
-        }
-    }
-    let gains: Vec<f64> = change.iter().zip(&scale).filter(|(_, s)| **s > 0.0).map(|(c, s)| c / s).collect();
-    // The median keeps one odd log (something held, something touched) from deciding.
-    let mut sorted = gains.clone();
-    sorted.sort_by(f64::total_cmp);
-    match sorted.len() {
-        0 => 0.0,
-        n if n % 2 == 1 => sorted[n / 2],
-        n => 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]),
-    }
 }
 
 // Whether the evidence for a candidate is enough: the rule that accepts or refuses.

@@ -5,10 +5,11 @@ use super::super::model::{Accepted, Model};
 use super::super::named::TAKEN_BACK;
 use super::super::study::Study;
 use super::cross_validation::CrossValidation;
-use super::evidence::{Evidence, Extent, Validation, evidence, refusal};
-use super::screen::{Screen, Trial};
+use super::evidence::{Evidence, Extent, evidence, refusal};
+use super::screen::Screen;
 use crate::effects::{self, Candidate, Context, Effect};
 use powerball_controller::JointNumber;
+use powerball_identification::evidence::{Rows, Trial};
 use powerball_logs::parallel;
 use std::sync::OnceLock;
 
@@ -197,7 +198,7 @@ fn without_repeats(screen: &Screen<'_>, members: Vec<Member>) -> Vec<Member> {
         }
         let own = member.trial.columns.len();
         columns.extend(member.trial.columns.iter().cloned());
-        let together = screen.try_columns(columns.clone(), 1.0).map_or(gain, |trial| trial.gain);
+        let together = screen.base.ask(columns.clone(), 1.0).map_or(gain, |trial| trial.gain);
         let penalty = member.trial.gain - member.trial.score;
         if together - gain - penalty < least {
             columns.truncate(columns.len() - own);
@@ -301,7 +302,7 @@ pub(crate) struct Tester<'t> {
     pub(crate) screen: &'t Screen<'t>,
     /// Candidates that were tried in all.
     pub(crate) tests: f64,
-    pub(crate) validation: &'t Validation<'t>,
+    pub(crate) validation: &'t Rows<'t>,
     /// The model seen on the validation set.
     pub(crate) on_validation: &'t Context<'t>,
     /// The model that is judged.

@@ -5,11 +5,12 @@
 //! when logs were recorded if their times do not show it.
 
 use super::super::model::Model;
-use super::super::search::{Screen, Trial, Validation, validation_gain};
+use super::super::search::Screen;
 use super::super::study::Study;
 use crate::effects::{self, Candidate, Context, Effect};
 use crate::rule::Rule;
 use powerball_identification::estimate::{Design, Fit, friction_columns};
+use powerball_identification::evidence::{Rows, Trial, gain_on};
 use powerball_logs::log::Log;
 use powerball_logs::parallel;
 use powerball_logs::regression::{Data, Recording};
@@ -150,11 +151,11 @@ fn gain(rule: &Rule, effect: &dyn Effect, data: &Data<'_>, fit: &Fit, other: &Da
     }
     let residual = fit.residual_on(other, &[]);
     let design = Design::new(other, &friction_columns(other, &fit.shapes), &[]);
-    let validation = Validation { data: other, design, residual: residual.clone() };
+    let validation = Rows { data: other, design: &design, residual: &residual };
     let context = Context::new(other, fit, &residual, rule);
     let of = |(candidate, trial): &(&Candidate, Trial)| {
         let columns = effect.columns(&context, candidate);
-        let gain = validation_gain(&screen, trial, &candidate.joints, &validation, &columns);
+        let gain = gain_on(&validation, (trial, &columns), screen.base.weights, &candidate.joints);
         trial.score * gain.clamp(-1.0, 1.0)
     };
     best.iter().map(of).sum()
