@@ -40,4 +40,4 @@ pub use uncertainty::{Path, StandardErrors, Uncertainty, friction_row, standard_
 pub use variable_projection::Layout;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -29,6 +29,15 @@ impl Chance {
         Chance { scores }
     }
 
+    /// From `count` searches that see the residual shifted in time within each recording. `search` is given
+    /// the shift and returns its best score.
+    #[must_use]
+    pub fn of_search(count: usize, seed: u64, search: impl Fn(&Shift) -> f64 + Sync + Send) -> Chance {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let shifts: Vec<Shift> = (0..count).map(|_| Shift::draw(&mut rng, 0)).collect();
+        Chance::new(parallel::map(&shifts, search))
+    }
+
     /// The score below which a share of them stays; 0 where there is none.
     #[must_use]
     pub fn level(&self, share: f64) -> f64 {
@@ -73,10 +82,7 @@ pub fn draw(
     let recordings = joints.iter().map(|j| j.rows.len()).max().unwrap_or(0);
     let mut by_trial: Vec<Vec<Shift>> = vec![Vec::new(); trials.len()];
     for k in 0..count {
-        let fraction = rng.random_range(0.15..0.85);
-        // The first keeps its sign, since a column with all of them turned is the same column.
-        let sign = |r: usize| if r > 0 && rng.random_bool(0.5) { -1.0 } else { 1.0 };
-        let shift = Shift { fraction, signs: (0..recordings).map(sign).collect() };
+        let shift = Shift::draw(&mut rng, recordings);
         if let Some(of_trial) = by_trial.get_mut(k % trials.len().max(1)) {
             of_trial.push(shift);
         }
@@ -135,6 +141,14 @@ pub struct Shift {
 }
 
 impl Shift {
+    /// A shift far from none, with a sign for each of some recordings.
+    fn draw(rng: &mut ChaCha8Rng, recordings: usize) -> Shift {
+        let fraction = rng.random_range(0.15..0.85);
+        // The first keeps its sign, since a column with all of them turned is the same column.
+        let sign = |r: usize| if r > 0 && rng.random_bool(0.5) { -1.0 } else { 1.0 };
+        Shift { fraction, signs: (0..recordings).map(sign).collect() }
+    }
+
     /// Rows of a recording of `n` by which it is shifted.
     #[must_use]
     pub fn rows(&self, n: usize) -> usize {
@@ -145,12 +159,7 @@ impl Shift {
 /// The surrogate of each shift: without signs if the shift alone makes the columns different from the
 /// original ones, with signs if these are needed (a constant torque, a wave of this very period), `None`
 /// where neither helps. `limit` is the largest correlation of a surrogate with its original.
-fn unlike(
-    columns: &[Column],
-    joints: &[JointRows],
-    shifts: &[Shift],
-    limit: f64,
-) -> Vec<Option<Shift>> {
+fn unlike(columns: &[Column], joints: &[JointRows], shifts: &[Shift], limit: f64) -> Vec<Option<Shift>> {
     let by_column = parallel::map(columns, |column| likeness(column, joints, shifts));
     let plain = |shift: &Shift| Shift { fraction: shift.fraction, signs: vec![1.0; shift.signs.len()] };
     let of = |(s, shift): (usize, &Shift)| {

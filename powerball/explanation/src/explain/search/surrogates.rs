@@ -8,12 +8,10 @@ use super::evidence::{Extent, evidence, refusal};
 use super::groups::{CandidateKind, groups};
 use super::screen::Screen;
 use crate::effects::{Context, Effect};
-use chacha20::ChaCha8Rng;
 use powerball_controller::JointNumber;
-use powerball_identification::evidence::{Chance, Shift, Surrogate, Trial, draw, rotated, shifted};
+use powerball_identification::evidence::{Chance, Surrogate, Trial, draw, rotated, shifted};
 use powerball_logs::parallel;
 use powerball_logs::regression::Signals;
-use rand::{RngExt, SeedableRng};
 
 /// Draws the final surrogates; a step draws by its number.
 const FINAL_SEED: u64 = 99;
@@ -34,12 +32,10 @@ pub(crate) fn level_by_chance(screen: &Screen<'_>, trials: &[&Trial], short: boo
 /// windows is compared with what is found over as many.
 #[must_use]
 pub(crate) fn level_of_search(context: &Context<'_>, effect: &dyn Effect, seed: u64) -> f64 {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let shift = |rng: &mut ChaCha8Rng| Shift { fraction: rng.random_range(0.15..0.85), signs: Vec::new() };
-    let shifts: Vec<Shift> = (0..context.rule.searched_surrogates()).map(|_| shift(&mut rng)).collect();
-    let scores = parallel::map(&shifts, |shift| {
-        let residual: Signals = (context.residual.iter().enumerate())
-            .map(|(j, values)| rotated(values, &context.data.joints[j].rows, shift))
+    let rule = context.rule;
+    let chance = Chance::of_search(rule.searched_surrogates(), seed, |shift| {
+        let residual: Signals = (context.residual.iter().zip(&context.data.joints))
+            .map(|(values, joint)| rotated(values, &joint.rows, shift))
             .collect();
         let context = context.seen_with(&residual);
         let screen = Screen::new(&context);
@@ -47,7 +43,7 @@ pub(crate) fn level_of_search(context: &Context<'_>, effect: &dyn Effect, seed: 
         let scores = candidates.iter().filter_map(|c| Some(screen.try_candidate(c)?.score));
         scores.fold(0.0, f64::max)
     });
-    Chance::new(scores).level(1.0 - context.rule.family_wise)
+    chance.level(1.0 - rule.family_wise)
 }
 
 /// Asks surrogates of every kind on the final residual: where nothing is missing any more, what passes is
@@ -88,4 +84,3 @@ pub(crate) fn false_positives(study: &Study<'_>, model: &Model) -> FalsePositive
         family_wise: rule.family_wise,
     }
 }
-
