@@ -105,8 +105,12 @@ impl FoldFit {
     /// The fall of the held-out squared error.
     fn fall(&self, fitted: &Added, held: &Added) -> f64 {
         let (base, rest) = fitted.without_base(&self.solver);
-        let right: Vec<f64> =
-            fitted.right.iter().zip(&fitted.cross).map(|(own, cross)| own - dot(cross, &self.theta)).collect();
+        let right: Vec<f64> = fitted
+            .right
+            .iter()
+            .zip(&fitted.cross)
+            .map(|(own, cross)| own - dot(cross, &self.theta))
+            .collect();
         let x = fitted.solver(&rest).solve(&right);
         // The addition of the columns to the prediction: C x − A s.
         let mut shift = vec![0.0; self.theta.len()];

@@ -2,7 +2,7 @@
 
 use super::base::{Rows, Trial};
 use powerball_controller::JointNumber;
-use powerball_logs::regression::Column;
+use powerball_logs::regression::{Column, Data};
 use powerball_logs::vector::dot;
 
 /// The share of the squared error of `joints` that a trial takes away on other logs, on which its columns are
@@ -27,7 +27,8 @@ pub fn gain_on(
         }
     }
     // The median keeps one odd log (something held, something touched) from deciding.
-    let mut gains: Vec<f64> = fall.iter().zip(&scale).filter(|(_, s)| **s > 0.0).map(|(f, s)| f / s).collect();
+    let mut gains: Vec<f64> =
+        fall.iter().zip(&scale).filter(|(_, s)| **s > 0.0).map(|(f, s)| f / s).collect();
     gains.sort_by(f64::total_cmp);
     match gains.len() {
         0 => 0.0,
@@ -51,6 +52,22 @@ pub fn log_change(other: &Rows<'_>, (trial, columns): (&Trial, &[Column])) -> f6
         }
     }
     if joints > 0.0 { sum / joints } else { 0.0 }
+}
+
+/// The mean square of a residual in one log over the variance that each joint has elsewhere, `sigma` squared,
+/// mean over the joints that have both.
+#[must_use]
+pub fn error_in_log(data: &Data<'_>, residual: &[Vec<f64>], sigma: &[f64], log: usize) -> Option<f64> {
+    let of = |j: usize| {
+        let rows = data.recordings.iter().zip(&data.joints[j].rows).filter(|(r, _)| r.log == log);
+        let (square, count) = rows.fold((0.0, 0), |(square, count), (_, rows)| {
+            let own = &residual[j][rows.clone()];
+            (square + dot(own, own), count + rows.len())
+        });
+        (count > 0 && sigma[j] > 0.0).then(|| square / count as f64 / sigma[j].powi(2))
+    };
+    let joints: Vec<f64> = (0..data.dof()).filter_map(of).collect();
+    (!joints.is_empty()).then(|| joints.iter().sum::<f64>() / joints.len() as f64)
 }
 
 /// The correlation of two additions to the prediction of the same rows: 1 where they are the same but for

@@ -22,7 +22,7 @@ mod surrogates;
 pub use base::{Base, Rows, Trial, penalty};
 pub use blocks::{Clusters, p_of_coefficients, p_of_sum};
 pub use folds::FoldFits;
-pub use held_out::{correlation, gain_on, log_change};
+pub use held_out::{correlation, error_in_log, gain_on, log_change};
 pub use surrogates::{Chance, Shift, Surrogate, draw, rotated, shifted};
 
 #[cfg(test)]

@@ -75,9 +75,7 @@ pub(crate) fn compare(
         .filter(|(f, _)| groups[*f].judged_on(joints));
     let other = close
         .map(|(f, score)| (score, self::explained(screen, &groups[*f], joints)))
-        .find(|(_, theirs)| {
-            correlation(screen.base.weights, &explained, theirs).powi(2) < 1.0 - rule.little
-        });
+        .find(|(_, theirs)| correlation(screen.base.weights, &explained, theirs).powi(2) < 1.0 - rule.little);
     let distinct_margin = other.map_or(relative_score(rule, own), |(score, _)| own / score);
     let twin = others
         .first()

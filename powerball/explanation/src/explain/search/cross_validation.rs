@@ -73,8 +73,8 @@ impl CrossValidation {
         // What either way adds to the prediction of the logs.
         let theirs = Trial { theta: other.theta.clone(), ..trial.clone() };
         let added = [trial, &theirs].map(|trial| screen.base.added(trial));
-        let [p, q] = [(screen, trial), (&back, &other)]
-            .map(|(screen, trial)| by_blocks(screen, trial, candidate));
+        let [p, q] =
+            [(screen, trial), (&back, &other)].map(|(screen, trial)| by_blocks(screen, trial, candidate));
         let product = (p * q).max(f64::MIN_POSITIVE);
         Some(CrossValidated {
             gain: forward.min(gain),

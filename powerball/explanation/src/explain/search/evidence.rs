@@ -10,7 +10,7 @@ use powerball_identification::estimate::distribution::f_tail;
 use powerball_identification::estimate::{Folds, MEAN_OVER, NormalEquations, variance_inflation};
 use powerball_identification::evidence::{Rows, Trial, gain_on};
 use powerball_logs::regression::Column;
-use powerball_logs::vector::dot;
+use powerball_logs::vector::{dot, median};
 
 /// The evidence for one candidate.
 #[derive(Clone, Debug)]
@@ -31,9 +31,7 @@ pub(crate) struct Evidence {
 impl Evidence {
     /// The median of the held-out gains over folds.
     pub(crate) fn median_gain(&self) -> f64 {
-        let mut gains = self.fold_gains.clone();
-        gains.sort_by(f64::total_cmp);
-        gains.get(gains.len() / 2).copied().unwrap_or(0.0)
+        median(&mut self.fold_gains.clone())
     }
 }
 
@@ -154,22 +152,15 @@ fn event_left(screen: &Screen<'_>, trial: &Trial, after: &[Vec<f64>]) -> f64 {
     for (j, residual) in screen.context.residual.iter().enumerate() {
         let inside = |i: &usize| trial.columns.iter().any(|c| c.at(j).is_some_and(|v| v[*i] != 0.0));
         let rows: Vec<usize> = (0..residual.len()).filter(inside).collect();
-        let mut elsewhere: Vec<f64> = (data.blocks.iter())
-            .filter(|block| !block.rows[j].is_empty())
-            .map(|block| mean_square(&residual[block.rows[j].clone()]))
-            .collect();
-        elsewhere.sort_by(f64::total_cmp);
-        let usual = elsewhere.get(elsewhere.len() / 2).copied().unwrap_or(0.0);
+        let blocks = data.blocks.iter().map(|block| &residual[block.rows[j].clone()]);
+        let elsewhere = blocks.filter(|own| !own.is_empty()).map(|own| dot(own, own) / own.len() as f64);
+        let usual = median(&mut elsewhere.collect::<Vec<f64>>());
         for i in rows {
             excess += fit.weights[j] * (residual[i] * residual[i] - usual);
             stays += fit.weights[j] * (after[j][i] * after[j][i] - usual);
         }
     }
     if excess > 0.0 { stays.max(0.0) / excess } else { f64::INFINITY }
-}
-
-fn mean_square(x: &[f64]) -> f64 {
-    dot(x, x) / x.len().max(1) as f64
 }
 
 // Whether the evidence for a candidate is enough: the rule that accepts or refuses.
