@@ -53,14 +53,14 @@ pub struct Rule {
     /// it is called; what either way round adds must be mostly the same, by their correlation.
     pub most: f64,
     /// What is more than this share is nearly all of a thing: four of five. The held-out squared error must
-    /// fall in so many of the folds; a log has the same push if that also explains so much of the force's own
+    /// fall in nearly all folds; a log has the same push if that also explains nearly all of the force's own
     /// torque, since a push of another size or direction is another one.
     pub nearly_all: f64,
-    /// Squared errors that differ by this factor are unlike. A validation log with so much more than the
-    /// fitted logs holds something that they do not; for position servos a mass or a gain is looked for in
-    /// such a log, and where none takes away most of its squared error, it is unlike the others from that
-    /// ratio of the rms on. A residual is coloured where its slow means vary so much more than those of white
-    /// noise.
+    /// Squared errors that differ by this factor are unlike. A validation log whose error is larger than that
+    /// of the fitted logs by it holds something that they do not; for position servos a mass or a gain is
+    /// looked for in such a log, and where none takes away most of its squared error, it is unlike the others
+    /// from that ratio of the rms on. A residual is coloured where the variance of its slow means is larger
+    /// than that of white noise by it.
     pub unlike: f64,
 
     /// Blocks that count as independent last this many autocorrelation times of what is left …

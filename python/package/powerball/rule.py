@@ -58,14 +58,14 @@ class Rule:
     #: it is called; what either way round adds must be mostly the same, by their correlation.
     most: float = 0.5
     #: What is more than this share is nearly all of a thing: four of five. The held-out squared error must
-    #: fall in so many of the folds; a log has the same push if that also explains so much of the force's
-    #: own torque, since a push of another size or direction is another one.
+    #: fall in nearly all folds; a log has the same push if that also explains nearly all of the force's own
+    #: torque, since a push of another size or direction is another one.
     nearly_all: float = 0.8
-    #: Squared errors that differ by this factor are unlike. A validation log with so much more than the
-    #: fitted logs holds something that they do not; for position servos a mass or a gain is looked for in
-    #: such a log, and where none takes away most of its squared error, it is unlike the others from that
-    #: ratio of the rms on. A residual is coloured where its slow means vary so much more than those of
-    #: white noise.
+    #: Squared errors that differ by this factor are unlike. A validation log whose error is larger than
+    #: that of the fitted logs by it holds something that they do not; for position servos a mass or a gain
+    #: is looked for in such a log, and where none takes away most of its squared error, it is unlike the
+    #: others from that ratio of the rms on. A residual is coloured where the variance of its slow means is
+    #: larger than that of white noise by it.
     unlike: float = 2.0
     #: Blocks that count as independent last this many autocorrelation times of what is left …
     block_memories: float = 3.0
