@@ -11,14 +11,13 @@ use super::model::{Accepted, Model, Origin};
 use super::study::Study;
 use crate::effects::position_ripple::{BINS, PositionRipple, Settings, Spectrum};
 use crate::effects::{Candidate, Context, Effect};
-use chacha20::ChaCha8Rng;
 use powerball_controller::JointNumber;
 use powerball_identification::estimate::distribution::{MANY, f_tail};
 use powerball_identification::estimate::residual_stats;
+use powerball_identification::evidence::{Chance, rotated};
 use powerball_logs::parallel;
 use powerball_logs::regression::{Data, Recording};
 use powerball_logs::signal::Band;
-use rand::{RngExt, SeedableRng};
 use std::f64::consts::{LN_2, TAU};
 
 /// Ripples of a joint, at most.
@@ -87,7 +86,7 @@ fn search(study: &Study<'_>, model: &Model) -> Vec<Ripple> {
     };
     let (mut fitted, validation) = (of(&study.data), of(&study.validation));
     let mut found: Vec<Ripple> = Vec::new();
-    let mut chance: Option<Vec<f64>> = None;
+    let mut chance: Option<Chance> = None;
     for j in 0..fitted.len() {
         for _ in 0..MOST {
             let left: Vec<&[f64]> = fitted[j].iter().map(|trace| trace.twice.as_slice()).collect();
@@ -106,8 +105,7 @@ fn search(study: &Study<'_>, model: &Model) -> Vec<Ripple> {
                 break;
             }
             let chance = chance.get_or_insert_with(|| heights_by_chance(&fitted, rule.searched_surrogates()));
-            let above = chance.iter().filter(|height| **height >= peak.height).count();
-            let p_value = (1 + above) as f64 / (1 + chance.len()) as f64;
+            let p_value = chance.p_value(peak.height);
             if p_value > rule.family_wise {
                 break;
             }
@@ -317,21 +315,12 @@ pub(super) fn highest(traces: &[Trace], values: &[&[f64]]) -> Option<Peak> {
 /// Draws the surrogates.
 const SEED: u64 = 12;
 
-/// The highest peaks of all joints in time-shift surrogates.
-pub(super) fn heights_by_chance(joints: &[Vec<Trace>], count: usize) -> Vec<f64> {
-    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
-    let most = joints.iter().map(Vec::len).max().unwrap_or(0);
-    let draws: Vec<Vec<f64>> =
-        (0..count).map(|_| (0..most).map(|_| rng.random_range(0.15..0.85)).collect()).collect();
-    parallel::map(&draws, |shares| {
+/// The highest peaks of all joints where the torque is shifted in time against the positions.
+fn heights_by_chance(joints: &[Vec<Trace>], count: usize) -> Chance {
+    Chance::of_search(count, SEED, |shift| {
         let of = |traces: &Vec<Trace>| {
-            let shift = |(trace, share): (&Trace, &f64)| {
-                let mut values = trace.twice.clone();
-                let by = (share * values.len() as f64) as usize;
-                values.rotate_left(by);
-                values
-            };
-            let shifted: Vec<Vec<f64>> = traces.iter().zip(shares).map(shift).collect();
+            let shifted = |trace: &Trace| rotated(&trace.twice, &[0..trace.twice.len()], shift);
+            let shifted: Vec<Vec<f64>> = traces.iter().map(shifted).collect();
             let values: Vec<&[f64]> = shifted.iter().map(Vec::as_slice).collect();
             highest(traces, &values).map_or(0.0, |peak| peak.height)
         };
@@ -430,6 +419,8 @@ const STEPS: i32 = 20;
 #[cfg(test)]
 mod traces_tests {
     use super::*;
+    use chacha20::ChaCha8Rng;
+    use rand::{RngExt, SeedableRng};
 
     const RATE: f64 = 250.0;
 
@@ -467,7 +458,7 @@ mod traces_tests {
         let traces = swinging(1, ripple);
         let found = peak(&traces);
         let chance = heights_by_chance(&[swinging(1, ripple)], 99);
-        assert!(chance.iter().all(|height| *height < found.height), "{} {chance:?}", found.height);
+        assert!(chance.p_value(found.height) <= 0.01, "{} {chance:?}", found.height);
         let order = refined(&traces, found.order);
         assert!((order - 161.3).abs() < 0.1, "{order}");
         let wave = Wave::of(&traces, order);
@@ -515,7 +506,7 @@ mod traces_tests {
             .map(|seed| {
                 let traces = vec![swinging(seed, |_| 0.0)];
                 let height = peak(&traces[0]).height;
-                usize::from(heights_by_chance(&traces, 19).iter().all(|chance| *chance < height))
+                usize::from(heights_by_chance(&traces, 19).p_value(height) <= 0.05)
             })
             .sum();
         // One of twenty is expected; five or more come once in 400.
