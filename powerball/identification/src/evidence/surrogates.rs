@@ -210,7 +210,7 @@ fn likeness(column: &Column, joints: &[JointRows], shifts: &[Shift]) -> Vec<Like
 }
 
 /// The products of the shifted columns with the base, with each other and with the residual, by shift.
-fn products(base: &Base<'_>, columns: &[Column], shifts: &[Shift]) -> Vec<Added> {
+pub(super) fn products(base: &Base<'_>, columns: &[Column], shifts: &[Shift]) -> Vec<Added> {
     let (rows, size) = (&base.rows, base.rows.design.size);
     let joints: Vec<usize> = base.joints_of(columns).collect();
     // By column and shift: with the base, and, last, with the residual.
