@@ -19,6 +19,7 @@ use powerball_logs::parallel;
 use powerball_logs::regression::{Data, Recording};
 use powerball_logs::signal::Band;
 use std::f64::consts::{LN_2, TAU};
+use std::slice;
 
 /// Ripples of a joint, at most.
 const MOST: usize = 4;
@@ -319,7 +320,8 @@ const SEED: u64 = 12;
 fn heights_by_chance(joints: &[Vec<Trace>], count: usize) -> Chance {
     Chance::of_search(count, SEED, |shift| {
         let of = |traces: &Vec<Trace>| {
-            let shifted = |trace: &Trace| rotated(&trace.twice, &[0..trace.twice.len()], shift);
+            let shifted =
+                |trace: &Trace| rotated(&trace.twice, slice::from_ref(&(0..trace.twice.len())), shift);
             let shifted: Vec<Vec<f64>> = traces.iter().map(shifted).collect();
             let values: Vec<&[f64]> = shifted.iter().map(Vec::as_slice).collect();
             highest(traces, &values).map_or(0.0, |peak| peak.height)

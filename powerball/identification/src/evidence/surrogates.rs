@@ -22,15 +22,15 @@ pub struct Chance {
 }
 
 impl Chance {
-    /// From the best score of each surrogate.
+    /// The chance that the best score of each surrogate shows.
     #[must_use]
     pub fn new(mut scores: Vec<f64>) -> Chance {
         scores.sort_by(f64::total_cmp);
         Chance { scores }
     }
 
-    /// From `count` searches that see the residual shifted in time within each recording. `search` is given
-    /// the shift and returns its best score.
+    /// The chance of a search that is done again `count` times, each time with the residual shifted in time
+    /// within each recording. `search` is given the shift and returns its best score.
     #[must_use]
     pub fn of_search(count: usize, seed: u64, search: impl Fn(&Shift) -> f64 + Sync + Send) -> Chance {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
