@@ -45,7 +45,7 @@ pub struct Rule {
     /// is in validation logs only must not raise that of a joint by more; on repeats of one path, where
     /// whoever has more parameters fits the error that is the same in all of them, the per-joint fit must
     /// lower it by more. Two paths, two parts of a residual, or the models of two names are the same but for
-    /// this share.
+    /// this share. A force in all but this share of a log's rests is that of a carried body.
     pub little: f64,
     /// What is more than this share is most of a thing: half. An event of some seconds (a push) must explain
     /// most of what its time has more of squared error than others; another log has the same push where it
