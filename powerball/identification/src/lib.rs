@@ -5,6 +5,7 @@
 pub mod comparison;
 pub mod conventions;
 pub mod estimate;
+pub mod evidence;
 pub mod excite;
 mod identify;
 mod known;

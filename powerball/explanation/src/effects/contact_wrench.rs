@@ -176,7 +176,7 @@ impl Effect for ContactWrench {
                 let (less, own) =
                     explains[found.clone()].iter().fold((0.0, 0.0), |sum, e| (sum.0 + e.0, sum.1 + e.1));
                 let as_long = found.len() as f64 * FINE > rule.most * lasted;
-                if less > rule.least_score + chance && less > rule.same_force * own && as_long {
+                if less > rule.least_score + chance && less > rule.nearly_all * own && as_long {
                     seen.windows.push(window(context, &steps, &log, &found)?);
                     open.extend([stretch.start..found.start, found.end..stretch.end]);
                 }

@@ -110,7 +110,7 @@ impl Effect for UnnamedLaw {
         let joints: Vec<JointNumber> = context.moving_joints().collect();
         let is_left = |j: &&JointNumber| {
             let (rule, j) = (context.rule, j.index());
-            rms[j] > rule.above_floor * floor[j] && context.fit.inflation[j] > rule.coloured
+            rms[j] > rule.above_floor * floor[j] && context.fit.inflation[j] > rule.unlike
         };
         let mut candidates = Vec::new();
         for &joint in joints.iter().filter(is_left) {

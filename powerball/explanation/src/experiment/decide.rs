@@ -10,9 +10,10 @@
 use crate::explain::{Hypothesis, Open};
 use crate::options::{ExplainError, ExplainOptions};
 use powerball_identification::estimate::Folds;
-use powerball_identification::estimate::blocks::p_of_sum;
+use powerball_identification::evidence::p_of_sum;
 use powerball_logs::log::Log;
 use powerball_logs::regression::{Data, RigidArm, Signals};
+use powerball_logs::vector::dot;
 
 /// The decision.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +69,7 @@ pub fn decide(
                 first.name
             ),
         )
-    } else if share < rule.same_model && own_a != own_b {
+    } else if share < rule.little && own_a != own_b {
         let simpler = if own_a < own_b { a } else { b };
         let more = if own_a < own_b { b } else { a };
         (
@@ -96,19 +97,11 @@ pub fn decide(
 
 /// χ² of `b` less that of `a`, by block.
 fn leads(data: &Data<'_>, a: &Hypothesis, b: &Hypothesis) -> Vec<f64> {
-    let residual = |h: &Hypothesis| -> Signals {
-        let design = h.design(data);
-        let rest = |j: usize| {
-            let predicted = design.predict(j, &h.fit.theta);
-            data.joints[j].torque.iter().zip(predicted).map(|(y, p)| y - p).collect()
-        };
-        (0..data.dof()).map(rest).collect()
-    };
-    let (of_a, of_b) = (residual(a), residual(b));
+    let (of_a, of_b) = (a.residual_on(data), b.residual_on(data));
     let joint = |j: usize, rows: &std::ops::Range<usize>| {
         let weight = 0.5 * (a.fit.weights[j] + b.fit.weights[j]);
-        let square = |r: &[f64]| r.iter().map(|v| v * v).sum::<f64>();
-        weight * (square(&of_b[j][rows.clone()]) - square(&of_a[j][rows.clone()]))
+        let square = |of: &Signals| dot(&of[j][rows.clone()], &of[j][rows.clone()]);
+        weight * (square(&of_b) - square(&of_a))
     };
     (data.blocks.iter())
         .map(|block| block.rows.iter().enumerate().map(|(j, rows)| joint(j, rows)).sum())
@@ -117,18 +110,9 @@ fn leads(data: &Data<'_>, a: &Hypothesis, b: &Hypothesis) -> Vec<f64> {
 
 /// How much two models differ over what their own names explain, rms over rms, weighted by joint.
 fn difference(data: &Data<'_>, a: &Hypothesis, b: &Hypothesis) -> f64 {
-    let (own_a, own_b) = (a.own_torque(data), b.own_torque(data));
-    let (of_a, of_b) = (a.design(data), b.design(data));
-    let (mut apart, mut size) = (0.0, [0.0; 2]);
-    for j in 0..data.dof() {
-        let w = a.fit.weights[j];
-        let square = |x: &[f64]| w * x.iter().map(|v| v * v).sum::<f64>();
-        let (x, y) = (of_a.predict(j, &a.fit.theta), of_b.predict(j, &b.fit.theta));
-        apart += w * x.iter().zip(&y).map(|(x, y)| (x - y) * (x - y)).sum::<f64>();
-        size[0] += square(&own_a[j]);
-        size[1] += square(&own_b[j]);
-    }
-    let least = size[0].min(size[1]);
+    let square = |of: Signals| of.weighted_square(&a.fit.weights);
+    let apart = square(a.residual_on(data).without(&b.residual_on(data)));
+    let least = square(a.own_torque(data)).min(square(b.own_torque(data)));
     if least > 0.0 { (apart / least).sqrt() } else { f64::INFINITY }
 }
 

@@ -8,19 +8,18 @@
 
 use super::comparison::{Comparison, Step, relative_score};
 use super::model::{Accepted, Model, Origin};
-use super::search::penalty;
 use super::study::Study;
 use crate::effects::position_ripple::{BINS, PositionRipple, Settings, Spectrum};
 use crate::effects::{Candidate, Context, Effect};
-use chacha20::ChaCha8Rng;
 use powerball_controller::JointNumber;
-use powerball_identification::estimate::distribution::f_tail;
+use powerball_identification::estimate::distribution::{MANY, f_tail};
 use powerball_identification::estimate::residual_stats;
+use powerball_identification::evidence::{Chance, rotated};
 use powerball_logs::parallel;
 use powerball_logs::regression::{Data, Recording};
 use powerball_logs::signal::Band;
-use rand::{RngExt, SeedableRng};
 use std::f64::consts::{LN_2, TAU};
+use std::slice;
 
 /// Ripples of a joint, at most.
 const MOST: usize = 4;
@@ -88,7 +87,7 @@ fn search(study: &Study<'_>, model: &Model) -> Vec<Ripple> {
     };
     let (mut fitted, validation) = (of(&study.data), of(&study.validation));
     let mut found: Vec<Ripple> = Vec::new();
-    let mut chance: Option<Vec<f64>> = None;
+    let mut chance: Option<Chance> = None;
     for j in 0..fitted.len() {
         for _ in 0..MOST {
             let left: Vec<&[f64]> = fitted[j].iter().map(|trace| trace.twice.as_slice()).collect();
@@ -106,15 +105,14 @@ fn search(study: &Study<'_>, model: &Model) -> Vec<Ripple> {
             if gain.min(wave.gain(&fitted[j])) < rule.least_gain {
                 break;
             }
-            let chance = chance.get_or_insert_with(|| heights_by_chance(&fitted, rule.searched_surrogates));
-            let above = chance.iter().filter(|height| **height >= peak.height).count();
-            let p_value = (1 + above) as f64 / (1 + chance.len()) as f64;
+            let chance = chance.get_or_insert_with(|| heights_by_chance(&fitted, rule.searched_surrogates()));
+            let p_value = chance.p_value(peak.height);
             if p_value > rule.family_wise {
                 break;
             }
             let coefficients = wave.coefficients;
             fitted[j].iter_mut().for_each(|trace| trace.take_out(order, coefficients));
-            let score = 2.0 * peak.height - penalty(rule, 2, BINS as f64 / 2.0);
+            let score = 2.0 * peak.height - rule.penalty(2, BINS as f64 / 2.0);
             let ripple = Ripple { candidate, coefficients: coefficients.to_vec(), p_value, gain, score };
             if raises_error(study, model, &ripple) {
                 break;
@@ -318,21 +316,13 @@ pub(super) fn highest(traces: &[Trace], values: &[&[f64]]) -> Option<Peak> {
 /// Draws the surrogates.
 const SEED: u64 = 12;
 
-/// The highest peaks of all joints in time-shift surrogates.
-pub(super) fn heights_by_chance(joints: &[Vec<Trace>], count: usize) -> Vec<f64> {
-    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
-    let most = joints.iter().map(Vec::len).max().unwrap_or(0);
-    let draws: Vec<Vec<f64>> =
-        (0..count).map(|_| (0..most).map(|_| rng.random_range(0.15..0.85)).collect()).collect();
-    parallel::map(&draws, |shares| {
+/// The highest peaks of all joints where the torque is shifted in time against the positions.
+fn heights_by_chance(joints: &[Vec<Trace>], count: usize) -> Chance {
+    Chance::of_search(count, SEED, |shift| {
         let of = |traces: &Vec<Trace>| {
-            let shift = |(trace, share): (&Trace, &f64)| {
-                let mut values = trace.twice.clone();
-                let by = (share * values.len() as f64) as usize;
-                values.rotate_left(by);
-                values
-            };
-            let shifted: Vec<Vec<f64>> = traces.iter().zip(shares).map(shift).collect();
+            let shifted =
+                |trace: &Trace| rotated(&trace.twice, slice::from_ref(&(0..trace.twice.len())), shift);
+            let shifted: Vec<Vec<f64>> = traces.iter().map(shifted).collect();
             let values: Vec<&[f64]> = shifted.iter().map(Vec::as_slice).collect();
             highest(traces, &values).map_or(0.0, |peak| peak.height)
         };
@@ -378,9 +368,6 @@ impl Wave {
         products(traces, self.order).iter().zip(self.coefficients).map(|(p, c)| p * c).sum()
     }
 }
-
-/// Degrees of freedom that are as good as any number of them.
-const MANY: f64 = 1e6;
 
 /// Products of the residual above the band with cos(k·q) and sin(k·q).
 fn products(traces: &[Trace], order: f64) -> [f64; 2] {
@@ -434,6 +421,8 @@ const STEPS: i32 = 20;
 #[cfg(test)]
 mod traces_tests {
     use super::*;
+    use chacha20::ChaCha8Rng;
+    use rand::{RngExt, SeedableRng};
 
     const RATE: f64 = 250.0;
 
@@ -471,7 +460,7 @@ mod traces_tests {
         let traces = swinging(1, ripple);
         let found = peak(&traces);
         let chance = heights_by_chance(&[swinging(1, ripple)], 99);
-        assert!(chance.iter().all(|height| *height < found.height), "{} {chance:?}", found.height);
+        assert!(chance.p_value(found.height) <= 0.01, "{} {chance:?}", found.height);
         let order = refined(&traces, found.order);
         assert!((order - 161.3).abs() < 0.1, "{order}");
         let wave = Wave::of(&traces, order);
@@ -519,7 +508,7 @@ mod traces_tests {
             .map(|seed| {
                 let traces = vec![swinging(seed, |_| 0.0)];
                 let height = peak(&traces[0]).height;
-                usize::from(heights_by_chance(&traces, 19).iter().all(|chance| *chance < height))
+                usize::from(heights_by_chance(&traces, 19).p_value(height) <= 0.05)
             })
             .sum();
         // One of twenty is expected; five or more come once in 400.

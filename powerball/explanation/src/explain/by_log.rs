@@ -6,14 +6,14 @@
 use super::model::Model;
 use super::study::Study;
 use crate::effects::{self, Context, Settings, temperature};
-use faer::Mat;
 use powerball_controller::JointNumber;
-use powerball_identification::estimate::blocks::p_of_coefficients;
 use powerball_identification::estimate::{Design, Folds, Gram, Solver, friction_columns};
+use powerball_identification::evidence::{Base, Clusters, Rows, Trial};
 use powerball_logs::parallel;
 use powerball_logs::regression::{Column, Data, Signals};
 use powerball_logs::vector::dot;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// A change in one log.
 #[derive(Clone, Debug)]
@@ -61,9 +61,12 @@ pub(crate) fn changes(
     let places: Vec<(usize, usize)> =
         (0..tried.len()).flat_map(|t| (0..logs.len()).map(move |l| (t, l))).collect();
     while logs.len() > 1 && found.len() < MOST_A_LOG * logs.len() {
+        let bases = [0, 1].map(|side| together.base(side));
         let asked: Vec<Option<(f64, f64)>> = parallel::map(&places, |(t, l)| {
             let (side, log) = logs[*l];
-            together.screen(side, log, &tried[*t].columns[side])
+            let column = tried[*t].columns[side].clone();
+            let trial = bases[side].ask_within(vec![column], 1.0, |j| together.rows(side, log, j))?;
+            Some((trial.theta[0], trial.gain))
         });
         let of = |t: usize, l: usize| asked[t * logs.len() + l];
         // From the largest on, until one is sure.
@@ -74,17 +77,17 @@ pub(crate) fn changes(
         });
         order.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
         let sure = |&(t, l): &(usize, usize)| -> Option<(Asked, f64)> {
-            let (side, log) = logs[l];
-            let asked = together.ask(side, log, &tried[t].columns[side])?;
-            if !tried[t].possible.contains(&asked.theta) {
+            let asked = together.ask(logs[l], &tried[t].columns[logs[l].0])?;
+            let theta = asked.trial.theta[0];
+            if !tried[t].possible.contains(&theta) {
                 return None;
             }
             let others: Vec<f64> =
                 (0..logs.len()).filter(|k| *k != l).filter_map(|k| Some(of(t, k)?.0)).collect();
-            let share = share(&together, (side, log), &logs, &tried[t].joints, &asked, rule.odd_log)?;
+            let share = share(&together, logs[l], &logs, &tried[t].joints, &asked, rule.unlike)?;
             let enough = share >= 1.0 - rule.max_unexplained
-                && by_chance(&together, &asked) * places.len() as f64 <= rule.family_wise
-                && stands_out(asked.theta, &others);
+                && together.by_chance(&asked) * places.len() as f64 <= rule.family_wise
+                && stands_out(theta, &others);
             enough.then_some((asked, share))
         };
         let Some((place, (asked, share))) = order.iter().find_map(|place| Some((*place, sure(place)?)))
@@ -95,7 +98,7 @@ pub(crate) fn changes(
         let (side, log) = logs[place.1];
         let Tried { effect, joints, unit, .. } = &tried[place.0];
         let log = together.data[side].logs[log].clone();
-        let value = unit * asked.theta;
+        let value = unit * asked.trial.theta[0];
         found.push((place, Changed { log, effect, joints: joints.clone(), value, share }));
     }
     (found.into_iter().map(|(_, changed)| changed).collect(), together.residual)
@@ -141,7 +144,7 @@ fn friction(context: &Context<'_>, model: &Model, joint: JointNumber) -> Column 
 }
 
 /// The share of what the squared error of some joints is larger in a log than in any other one that goes with
-/// a column; `None` where it is not `odd_log` times as large. Logs of other paths are predicted more or less
+/// a column; `None` where it is not `odd` times as large. Logs of other paths are predicted more or less
 /// well, and the best fit in one of them only resembles that.
 fn share(
     together: &Together<'_>,
@@ -155,23 +158,16 @@ fn share(
         let (mut square, mut count) = (0.0, 0);
         for j in joints.iter().map(|j| j.index()) {
             let rows = together.rows(side, log, j);
-            let theta = if with { asked.theta } else { 0.0 };
-            let left =
-                together.residual[side][j][rows.clone()].iter().zip(&asked.column[side][j][rows.clone()]);
-            square += together.weight(j) * left.map(|(r, c)| (r - theta * c).powi(2)).sum::<f64>();
-            count += rows.len();
+            let residual = &together.residual[side][j][rows.clone()];
+            let fall = if with { together.side(side).fall(&asked.added[side], j, rows) } else { 0.0 };
+            square += together.weights[j] * (dot(residual, residual) - fall);
+            count += residual.len();
         }
         (count > 0).then(|| square / count as f64)
     };
     let usual = logs.iter().filter(|log| **log != own).filter_map(|log| error(log, true)).reduce(f64::max)?;
     let (before, after) = (error(&own, false)?, error(&own, true)?);
     (before > odd * usual).then(|| (before - after) / (before - usual))
-}
-
-/// The probability of such a coefficient by chance: blocks of all logs as clusters.
-fn by_chance(together: &Together<'_>, asked: &Asked) -> f64 {
-    let square = Mat::from_fn(1, 1, |_, _| asked.gain / asked.theta.powi(2));
-    p_of_coefficients(&[asked.theta], &square, &together.by_block(asked))
 }
 
 /// Whether a coefficient is unlike those of other logs.
@@ -192,21 +188,19 @@ pub(crate) struct Together<'s> {
     pub(crate) data: [&'s Data<'s>; SIDES],
     /// Residual of the model, by side, joint and row, N·m.
     pub(crate) residual: [Signals; SIDES],
-    /// The model's coefficients.
-    pub(crate) theta: Vec<f64>,
     designs: [Design; SIDES],
     solver: Solver,
     weights: Vec<f64>,
 }
 
-/// The part of a log's residual that a column of this log explains in addition to the model.
-pub(crate) struct Asked {
-    /// The column's coefficient.
-    pub(crate) theta: f64,
-    /// χ² explained.
-    pub(crate) gain: f64,
-    /// The column less what the model imitates of it, by side, joint and row.
-    pub(crate) column: [Signals; SIDES],
+/// The answer for a column of one log.
+struct Asked {
+    /// Its coefficient and what it explains.
+    trial: Trial,
+    /// The column less what the model imitates of it, by side, joint and column.
+    freed: [Vec<Vec<Vec<f64>>>; SIDES],
+    /// What it adds to the prediction, by side, joint and row, N·m.
+    added: [Signals; SIDES],
 }
 
 impl<'s> Together<'s> {
@@ -220,9 +214,8 @@ impl<'s> Together<'s> {
         normal.add(&(0..fit.design.size).collect::<Vec<_>>(), &more, 1.0);
         let solver = normal.solver(|c| fit.free[c]);
         let solved = solver.solve(&normal.right);
-        let theta: Vec<f64> =
-            (0..solved.len()).map(|c| if fit.free[c] { solved[c] } else { fit.theta[c] }).collect();
-        let moved: Vec<f64> = theta.iter().zip(&fit.theta).map(|(new, old)| new - old).collect();
+        let moved: Vec<f64> =
+            (0..solved.len()).map(|c| if fit.free[c] { solved[c] - fit.theta[c] } else { 0.0 }).collect();
         let designs = [fit.design.clone(), on_validation];
         let mut residual = [fit.residual.clone(), model.residual_on_validation(study)];
         for (residual, design) in residual.iter_mut().zip(&designs) {
@@ -231,11 +224,11 @@ impl<'s> Together<'s> {
             }
         }
         let data = [&study.data, validation];
-        Together { data, residual, theta, designs, solver, weights: fit.weights.clone() }
+        Together { data, residual, designs, solver, weights: fit.weights.clone() }
     }
 
     /// The rows of a log on a joint.
-    pub(crate) fn rows(&self, side: usize, log: usize, joint: usize) -> Range<usize> {
+    fn rows(&self, side: usize, log: usize, joint: usize) -> Range<usize> {
         let data = self.data[side];
         let own = data.recordings.iter().zip(&data.joints[joint].rows).filter(|(r, _)| r.log == log);
         let (first, last) =
@@ -243,71 +236,51 @@ impl<'s> Together<'s> {
         if first < last { first..last } else { 0..0 }
     }
 
-    /// A joint's weight: 1 over the variance of the model's residual.
-    pub(crate) fn weight(&self, joint: usize) -> f64 {
-        self.weights[joint]
+    /// The model on the rows of a side.
+    fn base(&self, side: usize) -> Base<'_> {
+        Base::of_more(self.side(side), &self.weights, self.solver.clone(), 0.0)
     }
 
-    /// The coefficient of a column in one log alone and what it explains, χ²; `None` where the model imitates
-    /// it wholly.
-    pub(crate) fn screen(&self, side: usize, log: usize, column: &Column) -> Option<(f64, f64)> {
-        self.solve(side, log, column).map(|(theta, gain, _)| (theta, gain))
+    fn side(&self, side: usize) -> Rows<'_> {
+        Rows { data: self.data[side], design: &self.designs[side], residual: &self.residual[side] }
     }
 
-    /// Like [`Self::screen`], with the column itself.
-    pub(crate) fn ask(&self, side: usize, log: usize, column: &Column) -> Option<Asked> {
-        let (theta, gain, base) = self.solve(side, log, column)?;
-        let mut freed: [Signals; SIDES] = [0, 1].map(|s: usize| {
-            let negative = |j| self.designs[s].predict(j, &base).iter().map(|v| -v).collect();
-            (0..self.data[s].dof()).map(negative).collect()
-        });
-        for (j, values) in &column.parts {
+    /// Everything about a column in one log alone; `None` where the model imitates it wholly.
+    fn ask(&self, (side, log): (usize, usize), column: &Column) -> Option<Asked> {
+        let own = self.within((side, log), column);
+        let trial = self.base(side).ask(vec![own], 1.0)?;
+        let nothing = [Column::default()];
+        let columns = |s: usize| if s == side { trial.columns.as_slice() } else { nothing.as_slice() };
+        let freed = [0, 1].map(|s| self.side(s).freed(columns(s), &trial.shares));
+        let added = [0, 1].map(|s| self.side(s).added(columns(s), &trial));
+        Some(Asked { freed, added, trial })
+    }
+
+    /// A column that is zero but in one log.
+    fn within(&self, (side, log): (usize, usize), column: &Column) -> Column {
+        let of = |(j, values): &(usize, Arc<Vec<f64>>)| {
             let rows = self.rows(side, log, *j);
-            freed[side][*j][rows.clone()].iter_mut().zip(&values[rows]).for_each(|(f, v)| *f += v);
-        }
-        Some(Asked { theta, gain, column: freed })
+            let mut own = vec![0.0; values.len()];
+            own[rows.clone()].copy_from_slice(&values[rows]);
+            (*j, own.into())
+        };
+        Column { parts: column.parts.iter().map(of).collect() }
     }
 
-    /// The coefficient, the gain and the model's shares in the column.
-    fn solve(&self, side: usize, log: usize, column: &Column) -> Option<(f64, f64, Vec<f64>)> {
-        let mut cross = vec![0.0; self.theta.len()];
-        let (mut raw, mut score) = (0.0, 0.0);
-        for (j, values) in &column.parts {
-            let (rows, w) = (self.rows(side, log, *j), self.weights[*j]);
-            for (g, value) in self.designs[side].cross(*j, &rows, &[values.as_slice()]) {
-                cross[g] += w * value[0];
-            }
-            let own = &values[rows.clone()];
-            raw += w * dot(own, own);
-            score += w * dot(own, &self.residual[side][*j][rows]);
+    /// The probability of a coefficient by chance: blocks of all logs as clusters.
+    fn by_chance(&self, asked: &Asked) -> f64 {
+        let mut clusters = Clusters::new(1);
+        for side in 0..SIDES {
+            let left = self.residual[side].without(&asked.added[side]);
+            clusters.add(&self.data[side].blocks, &self.weights, &asked.freed[side], &left);
         }
-        let base = self.solver.solve(&cross);
-        let square = raw - dot(&cross, &base);
-        let theta = score / square;
-        (square > 1e-6 * raw && score.is_finite()).then_some((theta, theta * score, base))
-    }
-
-    /// The sums over blocks of all logs of a column times the residual with it: their variation shows
-    /// how surely its coefficient is known.
-    pub(crate) fn by_block(&self, asked: &Asked) -> Vec<Vec<f64>> {
-        let mut sums = Vec::new();
-        for (side, data) in self.data.iter().enumerate() {
-            for block in &data.blocks {
-                let of = |(j, rows): (usize, &Range<usize>)| {
-                    let (r, c) =
-                        (&self.residual[side][j][rows.clone()], &asked.column[side][j][rows.clone()]);
-                    self.weights[j] * (dot(c, r) - asked.theta * dot(c, c))
-                };
-                sums.push(vec![block.rows.iter().enumerate().map(of).sum()]);
-            }
-        }
-        sums
+        clusters.p_value(&asked.trial.theta)
     }
 
     /// Takes a column in.
-    pub(crate) fn take(&mut self, asked: &Asked) {
-        for (residual, column) in self.residual.iter_mut().zip(&asked.column) {
-            residual.add_signal(column, -asked.theta);
+    fn take(&mut self, asked: &Asked) {
+        for (residual, added) in self.residual.iter_mut().zip(&asked.added) {
+            residual.add_signal(added, -1.0);
         }
     }
 }

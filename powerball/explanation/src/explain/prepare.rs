@@ -153,8 +153,8 @@ fn is_plainly_better(model: &Model, other: &Model, study: &Study<'_>) -> bool {
     };
     let ([ours, back], [theirs, their_back]) = (errors(model), errors(other));
     let moving: Vec<usize> = (0..study.data.dof()).filter(|j| theirs[*j] > 0.0).collect();
-    let least = 1.0 - study.rule().large_gain;
+    let least = 1.0 - study.rule().large_gain();
     let better = |j: &&usize| ours[**j] < least * theirs[**j] && back[**j] < least * their_back[**j];
-    // One joint alone is treated like any other effect.
-    moving.iter().filter(better).count() >= study.rule().joints_with_zeros.min(moving.len()).max(1)
+    // One joint of several is treated like any other effect.
+    moving.iter().filter(better).count() >= moving.len().clamp(1, 2)
 }

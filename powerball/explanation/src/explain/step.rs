@@ -4,13 +4,14 @@ use super::comparison::{Comparison, Question, Step, compare};
 use super::model::{Accepted, Model, Origin};
 use super::named::Rival;
 use super::search::{
-    CandidateKind, Extent, Group, Member, Screen, Tester, Trial, Validation, eliminate, gains, groups,
-    keep_needed, level_by_chance, level_of_search,
+    CandidateKind, Extent, Group, Member, Screen, Tester, eliminate, gains, groups, keep_needed,
+    level_by_chance, level_of_search,
 };
 use super::study::Study;
 use crate::effects::{Candidate, Effect, Placed};
 use powerball_controller::JointNumber;
 use powerball_identification::estimate::{Design, friction_columns, residual_stats};
+use powerball_identification::evidence::{Rows, Trial};
 use std::sync::OnceLock;
 
 /// The proposal of a step, before the model is changed.
@@ -51,7 +52,7 @@ pub(super) fn propose(study: &Study<'_>, model: &Model, number: usize, among: Ca
     let residual = model.fit.residual_on(&study.validation, &columns);
     let design =
         Design::new(&study.validation, &friction_columns(&study.validation, &model.fit.shapes), &columns);
-    let validation = Validation { data: &study.validation, design, residual: residual.clone() };
+    let validation = Rows { data: &study.validation, design: &design, residual: &residual };
     let on_validation = study.on_validation(&model.fit, &residual);
     let tester = Tester {
         study,
@@ -112,15 +113,14 @@ fn most_promising(groups: &mut [Group], tester: &Tester<'_>) -> Option<usize> {
 fn simplest_as_good(groups: &mut [Group], best: usize, tester: &Tester<'_>) -> usize {
     let rule = tester.study.rule();
     let top = groups[best].potential();
-    let least = top - (rule.as_good * top).max(rule.as_good_score);
     let mut chosen = best;
     for g in 0..groups.len() {
         let simpler = groups[g].columns() < groups[chosen].columns();
-        if g == chosen || groups[g].potential() < least || !simpler {
+        if g == chosen || !rule.is_as_good(top, groups[g].potential()) || !simpler {
             continue;
         }
         tester.test(&mut groups[g]);
-        if groups[g].potential() >= least && groups[g].columns() < groups[chosen].columns() {
+        if rule.is_as_good(top, groups[g].potential()) && groups[g].columns() < groups[chosen].columns() {
             chosen = g;
         }
     }

@@ -171,7 +171,7 @@ pub(super) fn odd(sizes: &[[Option<Size>; 2]], fitted: usize, rule: &Rule) -> Ve
     let best = |(of, ratio): (&[Option<Size>; 2], &Option<f64>)| -> Option<Change> {
         let clear = |change: &Change| {
             of[*change as usize].is_some_and(|size| {
-                ratio.is_some_and(|ratio| ratio > rule.odd_log)
+                ratio.is_some_and(|ratio| ratio > rule.unlike)
                     && size.left() <= 1.0 - rule.most
                     && size.is_clear(*change, spreads[*change as usize])
             })

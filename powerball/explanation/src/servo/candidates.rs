@@ -4,7 +4,7 @@
 use super::result::{ServoEffect, ServoRival};
 use crate::rule::Rule;
 use powerball_controller::JointNumber;
-use powerball_identification::estimate::blocks::p_of_sum;
+use powerball_identification::evidence::p_of_sum;
 use powerball_identification::servo::constants::Constant;
 use powerball_identification::servo::fit::{Free, errors, fit, objective};
 use powerball_identification::servo::{Joint, Problem, Role, ServoArm};
@@ -196,7 +196,7 @@ fn best<'l>(
     tried.sort_by(|a, b| a.2.total_cmp(&b.2));
     let mut tried = tried.into_iter();
     let (best, k, left, p_value) = tried.next()?;
-    let is_sure = left <= 1.0 - rule.large_gain || p_value <= level;
+    let is_sure = left <= 1.0 - rule.large_gain() || p_value <= level;
     if left > 1.0 - rule.least_gain || !is_sure || candidates[k].ends_at_bound(&best) {
         return None;
     }

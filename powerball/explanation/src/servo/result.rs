@@ -96,7 +96,7 @@ pub struct LogResult {
     /// The file.
     pub log: String,
     /// Whether it is as the others are: it has nothing alone, named or not, and its `error_ratio` is at most
-    /// [`Rule::odd_log`].
+    /// [`Rule::unlike`].
     pub like_the_others: bool,
     /// The log's position error before anything was named, over the median one of the fitted logs; of the
     /// joint where it is largest.
@@ -159,7 +159,7 @@ impl ExplainedServos {
     /// What follows from all joints.
     pub(super) fn conclude(&mut self, rule: &Rule) {
         for log in &mut self.logs {
-            let is_usual = log.error_ratio.is_none_or(|ratio| ratio <= rule.odd_log);
+            let is_usual = log.error_ratio.is_none_or(|ratio| ratio <= rule.unlike);
             log.like_the_others &= log.differs.is_empty() && is_usual;
         }
         for j in 0..self.goal_error.len() {
@@ -169,7 +169,7 @@ impl ExplainedServos {
             let left = self.goal_error[j].map(|goal_error| after / goal_error.max(f64::MIN_POSITIVE));
             let state = match left {
                 None => "not judged",
-                Some(left) if left <= rule.predicted_share => "predicted",
+                Some(left) if left <= rule.little => "predicted",
                 Some(left) if after < before && left < 1.0 => "improved",
                 Some(_) => "not predicted",
             };

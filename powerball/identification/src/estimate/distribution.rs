@@ -1,5 +1,8 @@
 //! Tail probabilities that tests of significance need.
 
+/// Degrees of freedom that are as good as any number of them: those of a normal distribution.
+pub const MANY: f64 = 1e6;
+
 /// P(F > x) of Fisher's F with `d1` and `d2` degrees of freedom.
 #[must_use]
 pub fn f_tail(x: f64, d1: f64, d2: f64) -> f64 {
@@ -126,6 +129,8 @@ mod tests {
         }
         // By numerical integration of the density.
         approx::assert_relative_eq!(t_critical(2e-5, 40.0), 4.835023895055, max_relative = 1e-8);
+        // scipy.stats.norm.isf(p / 2)
+        approx::assert_relative_eq!(t_critical(1.25e-3, MANY), 3.2272187, max_relative = 1e-5);
         assert_eq!(f_tail(-1.0, 1.0, 5.0), 1.0);
         assert_eq!(f_tail(f64::NAN, 1.0, 5.0), 1.0);
     }

@@ -1,7 +1,6 @@
 //! Weighted least squares in the minimal set, friction shapes included, with honest standard errors.
 
 mod band;
-pub mod blocks;
 mod bounded;
 mod consistent;
 mod design;
@@ -41,4 +40,4 @@ pub use uncertainty::{Path, StandardErrors, Uncertainty, friction_row, standard_
 pub use variable_projection::Layout;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -5,8 +5,8 @@ use super::super::search::{Extent, Group, Member, Screen};
 use crate::effects::{Window, mask};
 use crate::rule::Rule;
 use powerball_controller::JointNumber;
+use powerball_identification::evidence::correlation;
 use powerball_logs::regression::Signals;
-use powerball_logs::vector::dot;
 
 /// How a chosen group compares with the others on its joints.
 #[derive(Clone, Debug)]
@@ -75,7 +75,7 @@ pub(crate) fn compare(
         .filter(|(f, _)| groups[*f].judged_on(joints));
     let other = close
         .map(|(f, score)| (score, self::explained(screen, &groups[*f], joints)))
-        .find(|(_, theirs)| shared(&explained, theirs) < rule.same_part);
+        .find(|(_, theirs)| correlation(screen.base.weights, &explained, theirs).powi(2) < 1.0 - rule.little);
     let distinct_margin = other.map_or(relative_score(rule, own), |(score, _)| own / score);
     let twin = others
         .first()
@@ -110,10 +110,10 @@ fn share_within(screen: &Screen<'_>, group: &Group, windows: &[Window]) -> f64 {
     let joints: Vec<JointNumber> = group.members.iter().flat_map(|m| m.candidate.joints.clone()).collect();
     let (mut inside, mut all) = (0.0, 0.0);
     for (j, explained) in explained(screen, group, &joints).iter().enumerate() {
-        let weight = context.fit.weights[j].sqrt();
+        let weight = context.fit.weights[j];
         let within = mask(context, j, windows);
         for ((e, r), m) in explained.iter().zip(&context.residual[j]).zip(&within) {
-            let less = e * (2.0 * weight * r - e);
+            let less = weight * e * (2.0 * r - e);
             inside += less * m;
             all += less;
         }
@@ -121,26 +121,11 @@ fn share_within(screen: &Screen<'_>, group: &Group, windows: &[Window]) -> f64 {
     if all > 0.0 { (inside / all).clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// The part of each joint's residual that a group's members on the given joints explain, in standard
-/// deviations.
+/// What a group's members on the given joints add to the prediction, by joint and row, N·m.
 fn explained(screen: &Screen<'_>, group: &Group, joints: &[JointNumber]) -> Signals {
     let mut sum = Signals::zeros(screen.context.data);
-    for member in group.on(joints) {
-        for (j, columns) in screen.residualised(&member.trial).iter().enumerate() {
-            let weight = screen.context.fit.weights[j].sqrt();
-            for (column, theta) in columns.iter().zip(&member.trial.theta) {
-                sum[j].iter_mut().zip(column).for_each(|(s, c)| *s += weight * theta * c);
-            }
-        }
-    }
+    group.on(joints).for_each(|member| sum.add_signal(&screen.base.added(&member.trial), 1.0));
     sum
-}
-
-/// The share of one signal's power that the other has as well.
-fn shared(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
-    let sum = |x: &[Vec<f64>], y: &[Vec<f64>]| x.iter().zip(y).map(|(x, y)| dot(x, y)).sum::<f64>();
-    let power = sum(a, a) * sum(b, b);
-    if power > 0.0 { sum(a, b).powi(2) / power } else { 0.0 }
 }
 
 /// The margin of a name without a rival: its score over the least that could have counted.

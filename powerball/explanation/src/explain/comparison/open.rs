@@ -63,6 +63,13 @@ impl Hypothesis {
         Design::new(data, &friction_columns(data, &self.fit.shapes), &columns)
     }
 
+    /// Residual of the whole model on some data, by joint and row, N·m.
+    #[must_use]
+    pub fn residual_on(&self, data: &Data<'_>) -> Signals {
+        let context = Context::for_columns(data, &self.fit, &self.rule);
+        self.fit.residual_on(data, &columns(&context, &self.candidates))
+    }
+
     /// The torque that this name explains alone on some data, by joint, N·m.
     #[must_use]
     pub fn own_torque(&self, data: &Data<'_>) -> Signals {

@@ -9,6 +9,7 @@ use super::open::{History, Question, Step};
 use crate::effects::Effect;
 use faer::Mat;
 use powerball_controller::JointNumber;
+use powerball_identification::estimate::distribution::{MANY, t_critical};
 use powerball_identification::estimate::{NormalEquations, Solver, noise_floor, residual_stats};
 use powerball_logs::regression::Signals;
 use powerball_logs::summary::{OCTAVES, halved};
@@ -106,7 +107,7 @@ fn find_harmful(study: &Study<'_>, model: &Model) -> Option<usize> {
     found.into_iter().find(|k| {
         let joints = &model.accepted[*k].candidate.joints;
         let without = model.without(study, *k).residual_on_validation(study);
-        [(joints, 0.0), (&all, study.rule().clear_change)]
+        [(joints, 0.0), (&all, study.rule().little)]
             .iter()
             .any(|(on, loss)| error(&without, on) < error(&with, on) - loss)
     })
@@ -169,11 +170,12 @@ fn octaves(signal: &[f64]) -> [Vec<f64>; OCTAVES] {
 /// the effect itself has another cause.)
 pub(crate) fn inconstant(study: &Study<'_>, model: &Model) -> Option<usize> {
     let rule = study.rule();
+    let errors = t_critical(rule.family_wise / OCTAVES as f64, MANY);
     let NormalEquations { gram, .. } = model.fit.normal_equations();
     let sizes: Vec<ByOctave> =
         model.places().into_iter().map(|own| by_octave(study, model, &gram, own)).collect();
     let missing = |(change, error): &(f64, f64)| {
-        let least = rule.most.max(rule.missing_errors * error);
+        let least = rule.most.max(errors * error);
         (least..2.0 - rule.most).contains(&-change)
     };
     let judged = |a: &usize| !model.accepted[*a].is_baseline() && !model.accepted[*a].effect().abrupt();

@@ -292,7 +292,7 @@ pub(crate) fn warnings(findings: &Findings<'_>) -> Vec<String> {
     }
     warnings.extend(findings.initial_fit.clock.note().map(str::to_string));
     let chance = &findings.false_positives;
-    if chance.accepted as f64 > rule.many_accepted * chance.surrogates as f64 && chance.accepted > FEW {
+    if chance.accepted as f64 > rule.negligible * chance.surrogates as f64 && chance.accepted > FEW {
         warnings.push(format!(
             "false positives: {} of {} time-shifted surrogates were accepted. The error that remains on \
                 these logs is large and smooth, and names given here may be wrong; see the unattributed \

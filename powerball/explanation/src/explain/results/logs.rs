@@ -11,6 +11,7 @@ use super::super::study::Study;
 use crate::effects::{Settings, Window, contact_wrench};
 use crate::rule::Rule;
 use powerball_controller::JointNumber;
+use powerball_identification::evidence::error_in_log;
 use powerball_logs::regression::{Data, Signals};
 use serde::Serialize;
 
@@ -150,19 +151,9 @@ fn of_accepted(study: &Study<'_>, model: &Model, place: usize, accepted: &Accept
 }
 
 impl Judged<'_> {
-    /// The mean square of some residuals on this log over the joint's variance, mean over joints that move.
+    /// The error of some residuals on this log.
     fn error(&self, sigma: &[f64], residual: &Signals) -> Option<f64> {
-        let of = |j: usize| {
-            let own = |r: &usize| self.data.recordings[*r].log == self.log;
-            let rows = (0..self.data.recordings.len()).filter(own).map(|r| &self.data.joints[j].rows[r]);
-            let (square, count) = rows.fold((0.0, 0), |(square, count), rows| {
-                let more = residual[j][rows.clone()].iter().map(|v| v * v).sum::<f64>();
-                (square + more, count + rows.len())
-            });
-            (count > 0 && sigma[j] > 0.0).then(|| square / count as f64 / sigma[j].powi(2))
-        };
-        let joints: Vec<f64> = (0..self.data.dof()).filter_map(of).collect();
-        (!joints.is_empty()).then(|| joints.iter().sum::<f64>() / joints.len() as f64)
+        error_in_log(self.data, residual, sigma, self.log)
     }
 
     /// When the log begins and ends, in its own t, s.
@@ -198,7 +189,7 @@ impl Judged<'_> {
         }
         differs.sort_by(|a, b| a.start_time.total_cmp(&b.start_time));
         let error_ratio = usual.filter(|usual| *usual > 0.0).map(|usual| after / usual);
-        let like_the_others = differs.is_empty() && error_ratio.is_none_or(|ratio| ratio <= rule.odd_log);
+        let like_the_others = differs.is_empty() && error_ratio.is_none_or(|ratio| ratio <= rule.unlike);
         LogResult { log, like_the_others, error_ratio, differs }
     }
 }

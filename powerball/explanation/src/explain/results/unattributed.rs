@@ -39,8 +39,7 @@ pub(crate) fn unattributed(
 ) -> (Option<Unattributed>, Vec<String>, Dependencies) {
     let (rule, context) = (study.rule(), model.context(study));
     let rms = &after.fit.rms;
-    let is_left =
-        |j: &usize| rms[*j] > rule.above_floor * floor[*j] && model.fit.inflation[*j] > rule.coloured;
+    let is_left = |j: &usize| rms[*j] > rule.above_floor * floor[*j] && model.fit.inflation[*j] > rule.unlike;
     let candidates: Vec<usize> = context.moving_joints().map(JointNumber::index).filter(is_left).collect();
     let found = parallel::map(&candidates, |j| depends_on(&context, *j));
     let dependencies = Dependencies::new(candidates.iter().copied().zip(found.iter().cloned()));

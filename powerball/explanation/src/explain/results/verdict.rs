@@ -32,7 +32,7 @@ pub enum State {
     /// ([`above_floor`](crate::rule::Rule::above_floor)).
     #[serde(rename = "at the noise floor")]
     AtNoiseFloor,
-    /// Little of the torque is left ([`predicted_share`](crate::rule::Rule::predicted_share)).
+    /// Little of the torque is left ([`little`](crate::rule::Rule::little)).
     #[serde(rename = "predicted")]
     Predicted,
     /// More error remains, but the named effects lowered it: the 95 % interval of the change lies below zero.
@@ -82,7 +82,7 @@ pub(crate) fn verdict(
         let improved = || changes.iter().any(|change| change.joint == joint && change.interval[1] < 0.0);
         let state = if is_at_noise_floor(study, rms, floor[j]) {
             State::AtNoiseFloor
-        } else if left <= study.rule().predicted_share {
+        } else if left <= study.rule().little {
             State::Predicted
         } else if improved() {
             State::Improved
@@ -105,14 +105,14 @@ fn is_at_noise_floor(study: &Study<'_>, rms: f64, floor: f64) -> bool {
 /// Whether the remaining error of a joint is so small that it needs no name; it is unknown for a joint that
 /// does not move in the validation logs.
 pub(super) fn needs_no_name(study: &Study<'_>, after: &ResidualStats, floor: &[f64], j: usize) -> bool {
-    let little = after.relative[j] <= study.rule().little_share;
+    let little = after.relative[j] <= study.rule().negligible;
     !study.validation.joints[j].is_empty() && (little || is_at_noise_floor(study, after.rms[j], floor[j]))
 }
 
 /// Likely causes and advice for a joint with a large remaining error.
 fn advice(study: &Study<'_>, j: usize, left: f64, over_noise: f64, dependencies: &Dependencies) -> String {
     let mut parts: Vec<String> = Vec::new();
-    if left > 1.0 - study.rule().predicted_share {
+    if left > 1.0 - study.rule().little {
         parts.push(
             "the model predicts almost nothing of this torque on other paths: check the sign, unit and \
                 order of the column, that the arm file belongs to this arm, and that the logs excite the \

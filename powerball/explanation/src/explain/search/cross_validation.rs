@@ -8,10 +8,10 @@
 
 use super::super::model::Model;
 use super::super::study::Study;
-use super::evidence::{Validation, left, log_change, validation_gain, wald};
-use super::screen::{Screen, Trial};
+use super::screen::Screen;
 use crate::effects::Candidate;
 use powerball_identification::estimate::{Design, Fit, Folds, fit, friction_columns};
+use powerball_identification::evidence::{Rows, Trial, correlation, gain_on, log_change};
 use powerball_logs::regression::{Data, Signals};
 use powerball_logs::vector::dot;
 
@@ -66,20 +66,22 @@ impl CrossValidation {
     ) -> Option<CrossValidated> {
         let on_validation = study.on_validation(&self.fit, &self.fit.residual);
         let back = Screen::new(&on_validation);
-        let cross_validation = back.try_columns(on_validation.columns(candidate), candidate.searched)?;
+        let other = back.base.ask(on_validation.columns(candidate), candidate.searched)?;
         let columns = screen.context.columns(candidate);
-        let judged =
-            Validation { data: &study.data, design: self.design.clone(), residual: self.residual.clone() };
-        let gain = validation_gain(&back, &cross_validation, &candidate.joints, &judged, &columns);
-        let [p, q] = [(screen, trial), (&back, &cross_validation)]
-            .map(|(screen, trial)| by_blocks(screen, trial, candidate));
+        let judged = Rows { data: &study.data, design: &self.design, residual: &self.residual };
+        let gain = gain_on(&judged, (&other, &columns), back.base.weights, &candidate.joints);
+        // What either way adds to the prediction of the logs.
+        let theirs = Trial { theta: other.theta.clone(), ..trial.clone() };
+        let added = [trial, &theirs].map(|trial| screen.base.added(trial));
+        let [p, q] =
+            [(screen, trial), (&back, &other)].map(|(screen, trial)| by_blocks(screen, trial, candidate));
         let product = (p * q).max(f64::MIN_POSITIVE);
         Some(CrossValidated {
             gain: forward.min(gain),
             // Fisher: −2 ln(p·q) is χ² with four degrees of freedom.
             p_value: (product * (1.0 - product.ln())).min(1.0),
-            correlation: correlation(screen, trial, &cross_validation.theta),
-            log_change: log_change(&back, &cross_validation, &judged, &columns),
+            correlation: correlation(screen.base.weights, &added[0], &added[1]),
+            log_change: log_change(&judged, (&other, &columns)),
         })
     }
 }
@@ -88,11 +90,11 @@ impl CrossValidation {
 fn by_blocks(screen: &Screen<'_>, trial: &Trial, candidate: &Candidate) -> f64 {
     let data = screen.context.data;
     let rule = screen.context.rule;
-    let residual = left(screen, trial, &screen.residualised(trial));
+    let residual = screen.base.left(trial);
     let memory = candidate.joints.iter().map(|j| memory(data, j.index(), &residual[j.index()]));
     let length = (rule.block_memories * memory.fold(0.0, f64::max)).max(rule.shortest_block);
     let length = length.min(rule.longest_block);
-    wald(screen, trial, &data.blocks_of(length))
+    screen.base.p_value(trial, &data.blocks_of(length))
 }
 
 /// The autocorrelation time of a joint's residual, s: twice the sum of its autocorrelation up to where that
@@ -114,30 +116,11 @@ fn memory(data: &Data<'_>, joint: usize, residual: &[f64]) -> f64 {
     (1.0 + 2.0 * later.take_while(|c| *c > 0.0).sum::<f64>() / power) / per_second
 }
 
-/// The correlation of what two sets of coefficients add on the logs.
-fn correlation(screen: &Screen<'_>, trial: &Trial, other: &[f64]) -> f64 {
-    let (mut cross, mut own, mut theirs) = (0.0, 0.0, 0.0);
-    for (j, columns) in screen.residualised(trial).iter().enumerate() {
-        let added = |theta: &[f64]| {
-            let mut sum = vec![0.0; screen.context.residual[j].len()];
-            for (column, theta) in columns.iter().zip(theta) {
-                sum.iter_mut().zip(column).for_each(|(s, c)| *s += theta * c);
-            }
-            sum
-        };
-        let (a, b, w) = (added(&trial.theta), added(other), screen.context.fit.weights[j]);
-        cross += w * dot(&a, &b);
-        own += w * dot(&a, &a);
-        theirs += w * dot(&b, &b);
-    }
-    if own > 0.0 && theirs > 0.0 { cross / (own * theirs).sqrt() } else { 0.0 }
-}
-
 impl CrossValidated {
     /// Whether it is enough; `tests` counts what was tried.
     pub(crate) fn is_enough(&self, rule: &crate::rule::Rule, tests: f64) -> bool {
-        self.gain >= rule.large_gain
+        self.gain >= rule.large_gain()
             && self.p_value * tests <= rule.family_wise
-            && self.correlation >= rule.least_correlation
+            && self.correlation >= rule.most
     }
 }

@@ -6,10 +6,11 @@
 use super::super::model::{Accepted, Model, Origin};
 use super::super::study::Study;
 use super::cross_validation::CrossValidation;
-use super::evidence::{Evidence, Extent, Validation, evidence, log_change};
-use super::screen::{Screen, Trial, penalty};
+use super::evidence::{Evidence, Extent, evidence};
+use super::screen::Screen;
 use crate::effects::{self, Candidate, Context, Placed, Window};
 use powerball_identification::estimate::{Design, friction_columns};
+use powerball_identification::evidence::{Rows, Trial, log_change};
 use powerball_logs::parallel;
 use powerball_logs::vector::dot;
 use std::ops::Range;
@@ -53,7 +54,7 @@ fn more_than_needed(study: &Study<'_>, model: &Model) -> Option<(usize, Candidat
         let rest: Vec<usize> =
             place.zip(&whole).filter(|(_, l)| *l != law).map(|(column, _)| column).collect();
         let gain = falls(model, slice::from_ref(&rest))[0];
-        if gain - penalty(rule, rest.len(), a.candidate.searched) < rule.least_score {
+        if gain - rule.penalty(rest.len(), a.candidate.searched) < rule.least_score {
             return Some((k, part.clone()));
         }
     }
@@ -67,7 +68,7 @@ fn weakest(study: &Study<'_>, model: &Model) -> Option<usize> {
     // Effects that are in the model from the start stay until everything else is known.
     let found = model.accepted.iter().enumerate().zip(gains(model)).filter(|((_, a), _)| !a.is_baseline());
     for ((k, a), gain) in found {
-        let score = gain - penalty(rule, a.columns(), a.candidate.searched);
+        let score = gain - rule.penalty(a.columns(), a.candidate.searched);
         if score < rule.least_score && weakest.is_none_or(|(_, w)| score < w) {
             weakest = Some((k, score));
         }
@@ -165,12 +166,12 @@ fn needed(study: &Study<'_>, model: &Model, place: usize) -> Option<Needed> {
     on_validation.add(&columns, coefficients);
     let design =
         Design::new(&study.validation, &friction_columns(&study.validation, &model.fit.shapes), &all);
-    let validation = Validation { data: &study.validation, design, residual: on_validation };
+    let validation = Rows { data: &study.validation, design: &design, residual: &on_validation };
     let set = Some((&validation, columns.as_slice()));
     let mut evidence = evidence(&screen, &trial, &candidate.joints, &study.folds, Extent::Everywhere, set);
     let cross_validation = CrossValidation::new(study, model, Some(place));
     let back = cross_validation.ask(study, &screen, (candidate, &trial, evidence.validation_gain));
-    let mut rise = [-log_change(&screen, &trial, &validation, &columns), 0.0];
+    let mut rise = [-log_change(&validation, (&trial, &columns)), 0.0];
     if let Some(back) = back {
         evidence.p_value = evidence.p_value.min(back.p_value);
         rise[1] = -back.log_change;

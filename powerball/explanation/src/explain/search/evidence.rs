@@ -2,16 +2,15 @@
 //!
 //! The module also decides whether the evidence for a candidate is sufficient.
 
-use super::screen::{Screen, Trial, fold_gains};
+use super::screen::Screen;
 use crate::effects::Candidate;
 use crate::rule::Rule;
-use faer::Mat;
 use powerball_controller::JointNumber;
-use powerball_identification::estimate::blocks::p_of_coefficients;
 use powerball_identification::estimate::distribution::f_tail;
-use powerball_identification::estimate::{Design, Folds, MEAN_OVER, NormalEquations, variance_inflation};
-use powerball_logs::regression::{Block, Column, Data, Signals};
-use powerball_logs::vector::dot;
+use powerball_identification::estimate::{Folds, MEAN_OVER, NormalEquations, variance_inflation};
+use powerball_identification::evidence::{Rows, Trial, gain_on};
+use powerball_logs::regression::Column;
+use powerball_logs::vector::{dot, median};
 
 /// The evidence for one candidate.
 #[derive(Clone, Debug)]
@@ -32,9 +31,7 @@ pub(crate) struct Evidence {
 impl Evidence {
     /// The median of the held-out gains over folds.
     pub(crate) fn median_gain(&self) -> f64 {
-        let mut gains = self.fold_gains.clone();
-        gains.sort_by(f64::total_cmp);
-        gains.get(gains.len() / 2).copied().unwrap_or(0.0)
+        median(&mut self.fold_gains.clone())
     }
 }
 
@@ -60,17 +57,6 @@ impl Extent {
     }
 }
 
-/// The validation set, prepared for one base model.
-#[derive(Debug)]
-pub(crate) struct Validation<'p> {
-    /// The data of the validation set.
-    pub(crate) data: &'p Data<'p>,
-    /// The base's columns on it.
-    pub(crate) design: Design,
-    /// Residual of the base on it.
-    pub(crate) residual: Signals,
-}
-
 /// Gathers the evidence for a trial. `validation` holds the validation set and the candidate's columns there.
 #[must_use]
 pub(crate) fn evidence(
@@ -79,78 +65,31 @@ pub(crate) fn evidence(
     joints: &[JointNumber],
     folds: &Folds,
     extent: Extent,
-    validation: Option<(&Validation<'_>, &[Column])>,
+    validation: Option<(&Rows<'_>, &[Column])>,
 ) -> Evidence {
+    let base = &screen.base;
     let (p_value, fold_gains, event_left) = match extent {
         Extent::Short(seconds) => {
-            let columns = screen.residualised(trial);
-            let after = left(screen, trial, &columns);
+            let after = base.left(trial);
             let by_chance = by_chance(screen, trial, &after, seconds);
-            (by_chance, event_gains(screen, trial, &columns), Some(event_left(screen, trial, &after)))
+            let gains = event_gains(screen, trial, &base.freed(trial));
+            (by_chance, gains, Some(event_left(screen, trial, &after)))
         }
         _ => {
             let local = extent != Extent::Everywhere;
-            let p_value = wald(screen, trial, &screen.context.data.blocks);
-            (p_value, fold_gains(screen, trial, joints, folds, local), None)
+            let p_value = base.p_value(trial, &base.rows.data.blocks);
+            (p_value, screen.folds.gains(base, trial, joints, folds, local), None)
         }
     };
+    let on_validation =
+        |(set, columns): (&Rows<'_>, &[Column])| gain_on(set, (trial, columns), base.weights, joints);
     Evidence {
         event_left,
         score: trial.score,
         p_value,
         fold_gains,
-        validation_gain: validation
-            .map_or(0.0, |(set, columns)| validation_gain(screen, trial, joints, set, columns)),
+        validation_gain: validation.map_or(0.0, on_validation),
     }
-}
-
-/// The test of a trial's coefficients between blocks.
-pub(crate) fn wald(screen: &Screen<'_>, trial: &Trial, blocks: &[Block]) -> f64 {
-    let fit = screen.context.fit;
-    let k = trial.columns.len();
-    let columns = screen.residualised(trial);
-    let mut square = Mat::<f64>::zeros(k, k);
-    let after = left(screen, trial, &columns);
-    let mut scores = Vec::new();
-    for block in blocks {
-        let mut score = vec![0.0; k];
-        let mut touched = false;
-        for (j, rows) in block.rows.iter().enumerate() {
-            let w = fit.weights[j];
-            if rows.is_empty() || w == 0.0 {
-                continue;
-            }
-            for a in 0..k {
-                let own = &columns[j][a][rows.clone()];
-                score[a] += w * dot(own, &after[j][rows.clone()]);
-                for b in 0..=a {
-                    square[(a, b)] += w * dot(own, &columns[j][b][rows.clone()]);
-                }
-            }
-            touched = true;
-        }
-        if touched {
-            scores.push(score);
-        }
-    }
-    for a in 0..k {
-        for b in 0..a {
-            square[(b, a)] = square[(a, b)];
-        }
-    }
-    p_of_coefficients(&trial.theta, &square, &scores)
-}
-
-/// The residual of a trial, given its columns without the base's shares.
-pub(super) fn left(screen: &Screen<'_>, trial: &Trial, columns: &[Vec<Vec<f64>>]) -> Signals {
-    let of = |(columns, residual): (&Vec<Vec<f64>>, &Vec<f64>)| {
-        let mut e = residual.clone();
-        for (column, theta) in columns.iter().zip(&trial.theta) {
-            e.iter_mut().zip(column).for_each(|(e, c)| *e -= theta * c);
-        }
-        e
-    };
-    columns.iter().zip(screen.context.residual).map(of).collect()
 }
 
 /// The probability of the gain by chance, for an event of some seconds, too short for blocks. Gains are over
@@ -213,99 +152,15 @@ fn event_left(screen: &Screen<'_>, trial: &Trial, after: &[Vec<f64>]) -> f64 {
     for (j, residual) in screen.context.residual.iter().enumerate() {
         let inside = |i: &usize| trial.columns.iter().any(|c| c.at(j).is_some_and(|v| v[*i] != 0.0));
         let rows: Vec<usize> = (0..residual.len()).filter(inside).collect();
-        let mut elsewhere: Vec<f64> = (data.blocks.iter())
-            .filter(|block| !block.rows[j].is_empty())
-            .map(|block| mean_square(&residual[block.rows[j].clone()]))
-            .collect();
-        elsewhere.sort_by(f64::total_cmp);
-        let usual = elsewhere.get(elsewhere.len() / 2).copied().unwrap_or(0.0);
+        let blocks = data.blocks.iter().map(|block| &residual[block.rows[j].clone()]);
+        let elsewhere = blocks.filter(|own| !own.is_empty()).map(|own| dot(own, own) / own.len() as f64);
+        let usual = median(&mut elsewhere.collect::<Vec<f64>>());
         for i in rows {
             excess += fit.weights[j] * (residual[i] * residual[i] - usual);
             stays += fit.weights[j] * (after[j][i] * after[j][i] - usual);
         }
     }
     if excess > 0.0 { stays.max(0.0) / excess } else { f64::INFINITY }
-}
-
-fn mean_square(x: &[f64]) -> f64 {
-    dot(x, x) / x.len().max(1) as f64
-}
-
-/// The addition of a trial to the prediction on the validation set, by joint and row, N·m.
-fn added(
-    screen: &Screen<'_>,
-    trial: &Trial,
-    validation: &Validation<'_>,
-    columns: &[Column],
-) -> Vec<Vec<f64>> {
-    let fit = screen.context.fit;
-    let mut shift = vec![0.0; fit.design.size];
-    for (base, theta) in trial.base.iter().zip(&trial.theta) {
-        shift.iter_mut().zip(base).for_each(|(s, b)| *s -= theta * b);
-    }
-    let of = |j: usize| {
-        let mut moved = validation.design.predict(j, &shift);
-        for (column, theta) in columns.iter().zip(&trial.theta) {
-            if let Some(values) = column.at(j) {
-                moved.iter_mut().zip(values).for_each(|(m, v)| *m += theta * v);
-            }
-        }
-        moved
-    };
-    (0..fit.design.dof()).map(of).collect()
-}
-
-/// The mean over joints of the logarithm of the squared error on the validation set, with a trial less
-/// without it: negative if the trial predicts better. It does not depend on the units or sizes of the joints.
-pub(crate) fn log_change(
-    screen: &Screen<'_>,
-    trial: &Trial,
-    validation: &Validation<'_>,
-    columns: &[Column],
-) -> f64 {
-    let moved = added(screen, trial, validation, columns);
-    let (mut sum, mut joints) = (0.0, 0.0);
-    for (residual, moved) in validation.residual.iter().zip(&moved) {
-        let before = dot(residual, residual);
-        let after = before - 2.0 * dot(residual, moved) + dot(moved, moved);
-        if before > 0.0 && after > 0.0 {
-            sum += (after / before).ln();
-            joints += 1.0;
-        }
-    }
-    if joints > 0.0 { sum / joints } else { 0.0 }
-}
-
-/// The share of the squared error of `joints` that a trial takes away on the validation set: the median over
-/// its logs.
-pub(crate) fn validation_gain(
-    screen: &Screen<'_>,
-    trial: &Trial,
-    joints: &[JointNumber],
-    validation: &Validation<'_>,
-    columns: &[Column],
-) -> f64 {
-    let fit = screen.context.fit;
-    let mut change = vec![0.0; validation.data.logs.len()];
-    let mut scale = vec![0.0; validation.data.logs.len()];
-    for (j, moved) in added(screen, trial, validation, columns).iter().enumerate() {
-        for (recording, rows) in validation.data.recordings.iter().zip(&validation.data.joints[j].rows) {
-            let (r, m) = (&validation.residual[j][rows.clone()], &moved[rows.clone()]);
-            change[recording.log] += fit.weights[j] * (2.0 * dot(r, m) - dot(m, m));
-            if joints.contains(&JointNumber::from_index(j)) {
-                scale[recording.log] += fit.weights[j] * dot(r, r);
-            }
-        }
-    }
-    let gains: Vec<f64> = change.iter().zip(&scale).filter(|(_, s)| **s > 0.0).map(|(c, s)| c / s).collect();
-    // The median keeps one odd log (something held, something touched) from deciding.
-    let mut sorted = gains.clone();
-    sorted.sort_by(f64::total_cmp);
-    match sorted.len() {
-        0 => 0.0,
-        n if n % 2 == 1 => sorted[n / 2],
-        n => 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]),
-    }
 }
 
 // Whether the evidence for a candidate is enough: the rule that accepts or refuses.
@@ -325,13 +180,13 @@ pub(crate) fn refusal(rule: &Rule, evidence: &Evidence, tests: f64, local: bool)
     let folds = &evidence.fold_gains;
     let good = folds.iter().filter(|g| **g > 0.0).count();
     let mean = folds.iter().sum::<f64>() / folds.len().max(1) as f64;
-    if (good as f64) < rule.folds_that_must_gain * folds.len() as f64 {
+    if (good as f64) < rule.nearly_all * folds.len() as f64 {
         return Some(format!("the held-out error falls in {good} of {} folds only", folds.len()));
     }
     if mean < rule.least_gain {
         return Some(format!("the held-out squared error falls by {:.1} % only", 100.0 * mean));
     }
-    if let Some(worst) = folds.iter().copied().reduce(f64::min).filter(|w| *w < rule.worst_fold) {
+    if let Some(worst) = folds.iter().copied().reduce(f64::min).filter(|w| *w < -rule.negligible) {
         return Some(format!("one held-out fold is {:.0} % worse", -100.0 * worst));
     }
     // A push is where errors are larger than elsewhere, and explains that.

@@ -5,10 +5,11 @@ use super::super::model::{Accepted, Model};
 use super::super::named::TAKEN_BACK;
 use super::super::study::Study;
 use super::cross_validation::CrossValidation;
-use super::evidence::{Evidence, Extent, Validation, evidence, refusal};
-use super::screen::{Screen, Trial};
+use super::evidence::{Evidence, Extent, evidence, refusal};
+use super::screen::Screen;
 use crate::effects::{self, Candidate, Context, Effect};
 use powerball_controller::JointNumber;
+use powerball_identification::evidence::{Rows, Trial};
 use powerball_logs::parallel;
 use std::sync::OnceLock;
 
@@ -170,8 +171,7 @@ fn compatible(screen: &Screen<'_>, mut members: Vec<Member>) -> Vec<Member> {
     };
     let (single, wide) = (choose(&|m| m.candidate.joints.len() == 1), choose(&|_| true));
     // One cause for all joints is preferred to one for each.
-    let as_good = single.0 - (rule.as_good * single.0).max(rule.as_good_score);
-    let kept = if as_good > wide.0 { single.1 } else { wide.1 };
+    let kept = if rule.is_as_good(single.0, wide.0) { wide.1 } else { single.1 };
     let mut at = 0;
     members.retain(|_| {
         at += 1;
@@ -198,7 +198,7 @@ fn without_repeats(screen: &Screen<'_>, members: Vec<Member>) -> Vec<Member> {
         }
         let own = member.trial.columns.len();
         columns.extend(member.trial.columns.iter().cloned());
-        let together = screen.try_columns(columns.clone(), 1.0).map_or(gain, |trial| trial.gain);
+        let together = screen.base.ask(columns.clone(), 1.0).map_or(gain, |trial| trial.gain);
         let penalty = member.trial.gain - member.trial.score;
         if together - gain - penalty < least {
             columns.truncate(columns.len() - own);
@@ -276,7 +276,7 @@ fn only_corrects(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<
     let (rule, effect) = (screen.context.rule, member.candidate.effect());
     // An event corrects nothing that lasts; but an event next to the beginning of another one corrects its
     // time.
-    let baseline = |a: &Accepted| begins_with(&a.candidate, &member.candidate, rule.same_event);
+    let baseline = |a: &Accepted| begins_with(&a.candidate, &member.candidate, rule.longest_block);
     let lasting: Vec<&Accepted> =
         model.accepted.iter().filter(|a| a.candidate.windows.is_empty() || baseline(a)).collect();
     let mut corrected = None;
@@ -284,7 +284,7 @@ fn only_corrects(model: &Model, screen: &Screen<'_>, member: &Member) -> Option<
     for (joint, gain) in screen.gains(&member.trial, &member.candidate.joints) {
         let small = lasting.iter().find(|a| {
             let alike = a.effect().class() == effect.class() && a.effect() != effect;
-            let share = if alike { rule.only_corrects_class } else { rule.only_corrects_any };
+            let share = if alike { rule.only_corrects_class } else { rule.negligible };
             let explained = a.explained.get(joint.index()).copied().unwrap_or(0.0);
             gain < share * explained * model.fit.weights[joint.index()]
         });
@@ -302,7 +302,7 @@ pub(crate) struct Tester<'t> {
     pub(crate) screen: &'t Screen<'t>,
     /// Candidates that were tried in all.
     pub(crate) tests: f64,
-    pub(crate) validation: &'t Validation<'t>,
+    pub(crate) validation: &'t Rows<'t>,
     /// The model seen on the validation set.
     pub(crate) on_validation: &'t Context<'t>,
     /// The model that is judged.
@@ -369,7 +369,7 @@ impl Judge<'_> {
     ) -> Option<String> {
         let (rule, local) = (self.study.rule(), !candidate.windows.is_empty());
         let refusal = refusal(rule, evidence, self.tests, local)?;
-        if local || evidence.score < rule.least_score || evidence.validation_gain < rule.large_gain {
+        if local || evidence.score < rule.least_score || evidence.validation_gain < rule.large_gain() {
             return Some(refusal);
         }
         let cross_validation = self.cross_validation.get_or_init(self.swap);

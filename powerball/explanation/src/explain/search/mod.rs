@@ -16,7 +16,7 @@ mod surrogates;
 
 pub(super) use cross_validation::CrossValidation;
 pub(super) use elimination::{eliminate, gains, keep_needed, refine};
-pub(super) use evidence::{Extent, Validation, evidence, refusal, validation_gain};
+pub(super) use evidence::{Extent, evidence, refusal};
 pub(super) use groups::{CandidateKind, Group, Member, Tester, groups, is_left};
-pub(super) use screen::{Screen, Trial, penalty};
+pub(super) use screen::Screen;
 pub(super) use surrogates::{false_positives, level_by_chance, level_of_search};

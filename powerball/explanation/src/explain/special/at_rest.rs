@@ -7,6 +7,7 @@
 use super::super::study::Study;
 use crate::effects::Window;
 use crate::effects::contact_wrench::Point;
+use crate::rule::Rule;
 use crate::torque_model::TorqueModel;
 use dyngen::arm::ParameterKind;
 use faer::Mat;
@@ -59,13 +60,9 @@ const LEAST_NOISE: f64 = 1e-9;
 const FOOT: f64 = 0.25;
 /// Motors whose torques are all below this share of the limits hold no arm that has weight: its brakes do.
 const BRAKED: f64 = 0.5;
-/// Least share of a push that one force must explain. It acts on another link than the last one if that
-/// link's origin explains this share more than the tool.
-const EXPLAINED: f64 = 0.5;
+/// A push acts on another link than the last one if that link's origin explains this share more than the
+/// tool.
 const OTHER_LINK: f64 = 0.2;
-/// A force during this share of the rests of a log, of which there are several, is that of a carried body,
-/// not a push.
-const CARRIED: f64 = 0.9;
 /// Rounds in which what pushes is taken out of what is usual.
 const ROUNDS: usize = 2;
 
@@ -80,14 +77,14 @@ pub(crate) fn pushes_at_rest(
     held: &[Vec<Window>; 2],
     errors: &[f64],
 ) -> Vec<RestPush> {
-    let sets = [&study.data, &study.validation];
+    let (sets, rule) = ([&study.data, &study.validation], study.rule());
     let friction = model.gammas().into_iter().map(|g| g[0].abs() + g[2].abs());
     let joints: Vec<Usual> =
         friction.zip(errors).map(|(friction, error)| Usual { friction, error: *error }).collect();
     let [mut fitted, judged] = [0, 1].map(|k| rests(sets[k], (model, arm), &held[k]));
     // A push in one log hides those of others until it is known.
     for _ in 0..ROUNDS {
-        let found = pushed(&fitted, None, &joints);
+        let found = pushed(rule, &fitted, None, &joints);
         let runs: Vec<Vec<Range<usize>>> = found.into_iter().flat_map(|(_, runs)| runs).collect();
         for (rest, runs) in fitted.iter_mut().zip(runs) {
             rest.calm = (0..rest.samples.len()).map(|k| !runs.iter().any(|run| run.contains(&k))).collect();
@@ -96,18 +93,21 @@ pub(crate) fn pushes_at_rest(
     let pushes = |k: usize, own: &[Rest<'_>], found: Vec<(Limits, Vec<Vec<Range<usize>>>)>| {
         let each = found.iter().flat_map(|(limits, runs)| runs.iter().map(move |runs| (limits, runs)));
         let of = |(rest, (limits, runs)): (&Rest<'_>, (&Limits, &Vec<Range<usize>>))| {
-            runs.iter().filter_map(|run| rest.push(sets[k], limits, run)).collect::<Vec<_>>()
+            let pushes = runs.iter().filter_map(|run| rest.push(sets[k], limits, run));
+            // One force must explain most of it.
+            pushes.filter(|push| push.share >= rule.most).collect::<Vec<_>>()
         };
         own.iter().zip(each).flat_map(of).collect::<Vec<_>>()
     };
-    let in_fitted = pushes(0, &fitted, pushed(&fitted, None, &joints));
-    let in_judged = pushes(1, &judged, pushed(&judged, Some(&fitted), &joints));
+    let in_fitted = pushes(0, &fitted, pushed(rule, &fitted, None, &joints));
+    let in_judged = pushes(1, &judged, pushed(rule, &judged, Some(&fitted), &joints));
     in_fitted.into_iter().chain(in_judged).collect()
 }
 
 /// The times of pushes, by log and rest, with the usual residual there. The rests of `fitted` give the usual
 /// residual of other logs; if there are none, the other logs of the rests themselves.
 fn pushed(
+    rule: &Rule,
     rests: &[Rest<'_>],
     fitted: Option<&[Rest<'_>]>,
     joints: &[Usual],
@@ -122,7 +122,8 @@ fn pushed(
         let mut runs: Vec<Vec<Range<usize>>> = own.iter().map(|rest| rest.pushed(&limits)).collect();
         let pushed: usize = runs.iter().flatten().map(Range::len).sum();
         let all: usize = own.iter().map(|rest| rest.samples.len()).sum();
-        if own.len() > 1 && pushed as f64 >= CARRIED * all as f64 {
+        // A force in all but little of several rests is that of a carried body, not a push.
+        if own.len() > 1 && pushed as f64 >= (1.0 - rule.little) * all as f64 {
             runs.iter_mut().for_each(Vec::clear);
         }
         (limits, runs)
@@ -298,7 +299,7 @@ impl Rest<'_> {
             .filter(|j| run.clone().any(|k| self.left[*j][k].abs() > limits.limit[*j]))
             .map(JointNumber::from_index);
         let beyond = |j: usize| (left[j].abs() - limits.limit[j]) / limits.noise[j] + DEVIATIONS;
-        (share >= EXPLAINED).then(|| RestPush {
+        Some(RestPush {
             size: self.size(limits, top),
             beyond: (0..dof).map(beyond).fold(0.0, f64::max),
             log: data.logs[self.recording.log].clone(),

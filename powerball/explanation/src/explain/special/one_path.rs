@@ -5,11 +5,12 @@
 //! when logs were recorded if their times do not show it.
 
 use super::super::model::Model;
-use super::super::search::{Screen, Trial, Validation, validation_gain};
+use super::super::search::Screen;
 use super::super::study::Study;
 use crate::effects::{self, Candidate, Context, Effect};
 use crate::rule::Rule;
 use powerball_identification::estimate::{Design, Fit, friction_columns};
+use powerball_identification::evidence::{Rows, Trial, gain_on};
 use powerball_logs::log::Log;
 use powerball_logs::parallel;
 use powerball_logs::regression::{Data, Recording};
@@ -39,7 +40,7 @@ fn same_path(rule: &Rule, a: &Recording, b: &Recording) -> bool {
             own[1] += y * y;
         }
     }
-    common > rule.same_path * (own[0] * own[1]).sqrt()
+    common > (1.0 - rule.little) * (own[0] * own[1]).sqrt()
 }
 
 // On a repeated path: one multibody model for all joints (the joint fit), or inertial parameters for each
@@ -59,7 +60,7 @@ pub(crate) fn predicts_better(model: (&Study<'_>, &Model), rival: (&Study<'_>, &
             rows += n;
         }
     }
-    log_ratio < rows * (1.0 - model.0.rule().clear_change).ln()
+    log_ratio < rows * (1.0 - model.0.rule().little).ln()
 }
 
 // When logs were recorded, if their times do not show it.
@@ -150,11 +151,11 @@ fn gain(rule: &Rule, effect: &dyn Effect, data: &Data<'_>, fit: &Fit, other: &Da
     }
     let residual = fit.residual_on(other, &[]);
     let design = Design::new(other, &friction_columns(other, &fit.shapes), &[]);
-    let validation = Validation { data: other, design, residual: residual.clone() };
+    let validation = Rows { data: other, design: &design, residual: &residual };
     let context = Context::new(other, fit, &residual, rule);
     let of = |(candidate, trial): &(&Candidate, Trial)| {
         let columns = effect.columns(&context, candidate);
-        let gain = validation_gain(&screen, trial, &candidate.joints, &validation, &columns);
+        let gain = gain_on(&validation, (trial, &columns), screen.base.weights, &candidate.joints);
         trial.score * gain.clamp(-1.0, 1.0)
     };
     best.iter().map(of).sum()
@@ -169,7 +170,7 @@ fn same_start(
     let reach = |j: usize| {
         let positions = data.recordings.iter().chain(other.recordings.iter()).flat_map(|r| r.position(j));
         let (low, high) = positions.fold((f64::MAX, f64::MIN), |(l, h): (f64, f64), q| (l.min(q), h.max(q)));
-        rule.same_start * (high - low).max(1e-9)
+        rule.negligible * (high - low).max(1e-9)
     };
     let reach: Vec<f64> = (0..data.dof()).map(reach).collect();
     move |a, b| reach.iter().enumerate().all(|(j, reach)| (a.q[j] - b.q[j]).abs() <= *reach)

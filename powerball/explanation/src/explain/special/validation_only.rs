@@ -8,8 +8,10 @@ use crate::effects::{self, Candidate, Context, Found, Part, Window, contact_wren
 use crate::options::ExplainOptions;
 use crate::rule::Rule;
 use powerball_identification::estimate::{Fit, Folds, Term, fit, noise_floor, residual_stats};
+use powerball_identification::evidence::error_in_log;
 use powerball_logs::log::Log;
 use powerball_logs::regression::{Column, Data, DataError, RigidArm, Signals};
+use powerball_logs::vector::median;
 
 /// Rounds in which the settings are made consistent with the coefficients.
 const ROUNDS: usize = 3;
@@ -84,7 +86,7 @@ pub(crate) fn validation_only_effects<'a>(
     let rule = &options.rule;
     let Baseline { validation, base, .. } = &baseline;
     let residual = base.residual_on(validation, &[]);
-    let odd = |log: usize| oddness(base, validation, &residual, log) > rule.odd_log;
+    let odd = |log: usize| oddness(base, validation, &residual, log) > rule.unlike;
     if !(0..validation.logs.len()).any(odd) {
         return Ok((baseline, Vec::new()));
     }
@@ -120,7 +122,7 @@ pub(crate) fn validation_only_effects<'a>(
     let Baseline { data, validation, base } = &baseline;
     let pushed = pooled.seen.iter().any(short) && {
         let (better, left) = with_zeros(rule, base, (data, validation));
-        (0..validation.logs.len()).any(|log| oddness(&better, validation, &left, log) > rule.odd_log)
+        (0..validation.logs.len()).any(|log| oddness(&better, validation, &left, log) > rule.unlike)
     };
     let new = |seen: &&Seen| {
         let in_validation = seen.candidate.windows.iter().all(|w| validation.logs.contains(&w.log));
@@ -166,14 +168,12 @@ fn taken_out_of_fitted<'a>(
     Baseline { data, validation, base }: &Baseline<'a>,
     seen: &Seen,
 ) -> Option<(ValidationOnlyEffect, Data<'a>, Fit)> {
-    let excess = |base: &Fit, residual: &[Vec<f64>]| -> f64 {
-        (0..validation.logs.len()).map(|log| oddness(base, validation, residual, log) - 1.0).sum()
-    };
     let torque = seen.torque(data, base, rule);
     let residual = base.residual_on(validation, &[]);
     let without = data.without_torque(&torque);
     let fitted = fit(&without, &Folds::new(&without), &[], None);
     let left = fitted.residual_on(validation, &[]);
+    let excess = |base: &Fit, residual: &Signals| excess(base, validation, residual, |_| true);
     if excess(&fitted, &left) > rule.max_unexplained * excess(base, &residual) {
         return None;
     }
@@ -219,11 +219,6 @@ fn named(
     let [before, after] = left.map(|residual| residual_stats(validation, &residual).rms);
     let context = Context::new(&pooled.data, &pooled.fit, &pooled.fit.residual, rule);
     let found: Vec<Found<'_>> = seen.iter().map(|seen| seen.found()).collect();
-    let middle = |seen: &&Seen| {
-        let mut gains = seen.fold_gains.clone();
-        gains.sort_by(f64::total_cmp);
-        gains.get(gains.len() / 2).copied()
-    };
     let mut logs: Vec<String> = Vec::new();
     for window in seen.iter().flat_map(|seen| &seen.candidate.windows) {
         if !logs.contains(&window.log) {
@@ -240,7 +235,7 @@ fn named(
         rms_before: before,
         rms_after: after,
         p_value: seen.iter().map(|seen| seen.p_value).fold(0.0, f64::max),
-        held_out_gain: seen.iter().filter_map(middle).collect(),
+        held_out_gain: seen.iter().map(|seen| median(&mut seen.fold_gains.clone())).collect(),
         logs,
         margin: seen.iter().map(|seen| seen.margin).fold(f64::INFINITY, f64::min),
         // No other column is fitted to validation logs.
@@ -347,18 +342,13 @@ impl Pooled<'_> {
 
 /// How many times the squared error of the fitted logs a log of other data has, mean over joints.
 fn oddness(base: &Fit, other: &Data<'_>, residual: &[Vec<f64>], log: usize) -> f64 {
-    let ratios: Vec<f64> = (0..other.dof())
-        .filter_map(|j| {
-            let rows = other.recordings.iter().zip(&other.joints[j].rows).filter(|(r, _)| r.log == log);
-            let (mut square, mut count) = (0.0, 0usize);
-            for (_, rows) in rows {
-                square += residual[j][rows.clone()].iter().map(|v| v * v).sum::<f64>();
-                count += rows.len();
-            }
-            (count > 50 && base.sigma[j] > 0.0).then(|| square / count as f64 / base.sigma[j].powi(2))
-        })
-        .collect();
-    ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
+    error_in_log(other, residual, &base.sigma, log).unwrap_or(0.0)
+}
+
+/// What the logs for which `of` holds have of that beyond the fitted logs, in all.
+fn excess(base: &Fit, other: &Data<'_>, residual: &[Vec<f64>], of: impl Fn(&String) -> bool) -> f64 {
+    let logs = (0..other.logs.len()).filter(|log| of(&other.logs[*log]));
+    logs.map(|log| oddness(base, other, residual, log) - 1.0).sum()
 }
 
 /// Whether the effect causes the difference of its logs: without its torque little of their excess over the
@@ -372,10 +362,9 @@ fn makes_it_odd(
     (windows, torque): (&[Window], &Signals),
 ) -> bool {
     let left = residual.without(torque);
-    let logs = || (0..other.logs.len()).filter(|log| windows.iter().any(|w| w.log == other.logs[*log]));
-    let excess =
-        |residual: &[Vec<f64>]| -> f64 { logs().map(|log| oddness(base, other, residual, log) - 1.0).sum() };
+    let own = |log: &String| windows.iter().any(|w| w.log == *log);
+    let excess = |residual: &Signals| excess(base, other, residual, own);
     let little = excess(&left) <= rule.max_unexplained * excess(residual);
     let (after, before) = (left.squares(), residual.squares());
-    little && !after.iter().zip(before).any(|(after, before)| *after > (1.0 + rule.clear_change) * before)
+    little && !after.iter().zip(before).any(|(after, before)| *after > (1.0 + rule.little) * before)
 }

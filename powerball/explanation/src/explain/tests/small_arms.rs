@@ -102,15 +102,6 @@ fn explained_logs(arm: &Arm, mut logs: Vec<Log>) -> Explained {
     explain_body(&body, fit, validate, &ExplainOptions::default()).unwrap()
 }
 
-/// The arm in a plane with logs of it, in two of which it holds a payload.
-pub(in super::super) fn planar_with_payload() -> (RigidArm, Vec<Log>) {
-    let (arm, plant) = planar();
-    let payload = Effect::Payload { mass: PAYLOAD, centre: [0.05, 0.02, 0.0], start: 0.0 };
-    let mut logs = recorded(&arm, &plant, &[(payload, &[1, 4])]);
-    common_clock(&mut logs);
-    (RigidArm::new(&arm).unwrap(), logs)
-}
-
 fn names(explained: &Explained) -> Vec<&str> {
     explained.effects.iter().map(|e| e.effect.as_str()).collect()
 }

@@ -7,5 +7,5 @@ mod estimators;
 mod friction;
 mod mountings;
 mod noise_free;
-mod plant;
+pub(crate) mod plant;
 mod summaries;

@@ -12,7 +12,7 @@ use powerball_virtual_arm::{Body, Dynamics, Plant, Sensors, lwa4p};
 use rand::{RngExt, SeedableRng};
 
 /// The arm's functions, and the true values of its minimal set.
-pub(super) fn truth() -> (RigidArm, Vec<f64>) {
+pub(crate) fn truth() -> (RigidArm, Vec<f64>) {
     let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
     let all: Vec<f64> = lwa4p::links().iter().flat_map(Body::parameters).collect();
     let values = body.model().set_values(body.model().set(SetKind::Minimal).unwrap(), &all);
@@ -20,18 +20,18 @@ pub(super) fn truth() -> (RigidArm, Vec<f64>) {
 }
 
 /// The virtual arm's own sensors.
-pub(super) fn sensors() -> Sensors {
+pub(crate) fn sensors() -> Sensors {
     lwa4p::plant().unwrap().sensors().clone()
 }
 
 /// Logs of random paths, each of `periods` times 10 s.
-pub(super) fn record(sensors: &Sensors, logs: usize, periods: usize, seed: u64) -> Vec<Log> {
+pub(crate) fn record(sensors: &Sensors, logs: usize, periods: usize, seed: u64) -> Vec<Log> {
     let filed = Mounting::Filed.gravity(&lwa4p::arm().unwrap());
     record_mounted(filed, lwa4p::links(), sensors, logs, periods, seed, &[])
 }
 
 /// Like [`record`], at a share of the velocity, with other friction.
-pub(super) fn record_slow(
+pub(crate) fn record_slow(
     share: f64,
     friction: Vec<TanhFriction<f64>>,
     sensors: &Sensors,
@@ -44,7 +44,7 @@ pub(super) fn record_slow(
 }
 
 /// Like [`record_slow`], with other links under any gravity in the base frame, and some joints held still.
-pub(super) fn record_mounted(
+pub(crate) fn record_mounted(
     gravity: [f64; 3],
     links: Vec<Body>,
     sensors: &Sensors,

@@ -1,9 +1,12 @@
 //! Significance between blocks of logs that count as independent: within a block a residual may have any
 //! colour.
 
-use super::distribution::f_tail;
-use super::solve::Solver;
+use super::base::{Base, Trial};
+use crate::estimate::Solver;
+use crate::estimate::distribution::f_tail;
 use faer::Mat;
+use powerball_logs::regression::Block;
+use powerball_logs::vector::dot;
 
 /// Fewer blocks say nothing about their spread.
 const FEWEST: f64 = 4.0;
@@ -42,6 +45,70 @@ pub fn p_of_coefficients(theta: &[f64], square: &Mat<f64>, scores: &[Vec<f64>]) 
     let solved = Solver::new(&spread, |a| theta[a] != 0.0).solve(&s);
     let wald: f64 = s.iter().zip(&solved).map(|(a, b)| a * b).sum();
     f_tail(wald / used * freedom / clusters, used, freedom)
+}
+
+/// Products of columns with each other and, block by block, with what their coefficients leave: what
+/// [`p_of_coefficients`] needs.
+#[derive(Debug)]
+pub struct Clusters {
+    /// k × k for k columns.
+    square: Mat<f64>,
+    scores: Vec<Vec<f64>>,
+}
+
+impl Clusters {
+    /// No block, for some columns.
+    #[must_use]
+    pub fn new(columns: usize) -> Clusters {
+        Clusters { square: Mat::zeros(columns, columns), scores: Vec::new() }
+    }
+
+    /// Adds blocks of some rows. `freed` are the columns without what the model imitates of them, by joint
+    /// and column, and `left` is what is left with them, by joint and row.
+    pub fn add(&mut self, blocks: &[Block], weights: &[f64], freed: &[Vec<Vec<f64>>], left: &[Vec<f64>]) {
+        let k = self.square.ncols();
+        for block in blocks {
+            let mut score = vec![0.0; k];
+            let mut touched = false;
+            for (j, rows) in block.rows.iter().enumerate() {
+                let w = weights[j];
+                if rows.is_empty() || w == 0.0 {
+                    continue;
+                }
+                for a in 0..k {
+                    let own = &freed[j][a][rows.clone()];
+                    score[a] += w * dot(own, &left[j][rows.clone()]);
+                    for b in 0..=a {
+                        let product = w * dot(own, &freed[j][b][rows.clone()]);
+                        self.square[(a, b)] += product;
+                        if a != b {
+                            self.square[(b, a)] += product;
+                        }
+                    }
+                }
+                touched = true;
+            }
+            if touched {
+                self.scores.push(score);
+            }
+        }
+    }
+
+    /// The probability of such coefficients by chance.
+    #[must_use]
+    pub fn p_value(&self, theta: &[f64]) -> f64 {
+        p_of_coefficients(theta, &self.square, &self.scores)
+    }
+}
+
+impl Base<'_> {
+    /// The probability of a trial's coefficients by chance, between blocks.
+    #[must_use]
+    pub fn p_value(&self, trial: &Trial, blocks: &[Block]) -> f64 {
+        let mut clusters = Clusters::new(trial.columns.len());
+        clusters.add(blocks, self.weights, &self.freed(trial), &self.left(trial));
+        clusters.p_value(&trial.theta)
+    }
 }
 
 #[cfg(test)]
