@@ -3,8 +3,8 @@
 use super::head::{Head, Literals};
 use super::language::{Routines, Stop, Value, World};
 use super::{Checked, Difference, Report, Source, Unreadable, c, rust, structure_of, wgsl};
+use crate::Language;
 use crate::arm::{Arm, JointKind};
-use crate::config::Language;
 use crate::dynamics::Function;
 use crate::dynamics::function::Argument;
 use crate::exact::angle::Angle;

@@ -1,7 +1,9 @@
 //! The functions of an arm: their arguments and results.
 
-use super::table::{COUNT, Row, TABLE};
+mod table;
+
 use std::fmt;
+use table::{COUNT, Row, TABLE};
 
 /// A function of the arm's state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -223,7 +225,7 @@ impl Argument {
 
 /// The kind of a function, on which its cost depends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub enum Kind {
     /// On the form of the recursion and on how it sums the parameters up.
     Dynamics,
     /// On the form of the recursion.
@@ -327,7 +329,8 @@ impl Function {
         )
     }
 
-    pub(crate) fn kind(self) -> Kind {
+    /// On what its cost depends.
+    pub fn kind(self) -> Kind {
         self.row().kind
     }
 

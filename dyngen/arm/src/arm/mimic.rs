@@ -104,7 +104,7 @@ impl Arm {
 impl Joint {
     /// What the joint's angle, as sines and cosines take it, holds in addition to q: theta where it is no
     /// multiple of pi/2.
-    pub(crate) fn theta_in_angle(&self) -> Angle {
+    pub fn theta_in_angle(&self) -> Angle {
         if self.theta.quarter_turns().is_some() { Angle::zero() } else { self.theta.clone() }
     }
 }

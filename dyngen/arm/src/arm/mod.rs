@@ -18,8 +18,7 @@ pub use mimic::{Drive, Mimic};
 use nalgebra::{Rotation3, Vector3};
 use num_traits::{One, Zero};
 pub use parameter::{Parameter, ParameterKind};
-#[cfg(feature = "urdf")]
-pub(crate) use read::is_name;
+pub use read::is_name;
 pub use servo::Servo;
 use std::fmt;
 use std::path::Path;
@@ -327,7 +326,7 @@ impl Arm {
     /// The chain of a standard table in the modified convention, with frame i on joint i and every parameter
     /// kept: the same axes and the same motion, but its links' parameters are expressed in other frames. It
     /// has no tool.
-    pub(crate) fn on_joints(&self) -> Arm {
+    pub fn on_joints(&self) -> Arm {
         let mut arm =
             Arm { convention: Convention::Modified, tool: None, frames: Vec::new(), ..self.clone() };
         let flat = || (Rational::zero(), Rational::zero(), Angle::PiMultiple(Rational::zero()));

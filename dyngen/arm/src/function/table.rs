@@ -1,9 +1,9 @@
 //! The one table of functions: their names, shapes and arguments, and a sentence about each.
 
-use super::function::Argument::{self, *};
-use super::function::Function::{self, *};
-use super::function::Kind;
-use super::function::Size::{self, Fixed, Joints, Parameters as ByParameter};
+use super::Argument::{self, *};
+use super::Function::{self, *};
+use super::Kind;
+use super::Size::{self, Fixed, Joints, Parameters as ByParameter};
 
 /// The description of a function in addition to its equations.
 pub(super) struct Row {

@@ -81,7 +81,7 @@ fn one_bracket(text: &str) -> Option<(Range<usize>, String)> {
 const LISTS: [&str; 5] = ["joint", "loop", "frame", "transmission", "grouping"];
 
 /// Whether a module may have this name.
-pub(crate) fn is_name(name: &str) -> bool {
+pub fn is_name(name: &str) -> bool {
     let mut letters = name.chars();
     letters.next().is_some_and(|c| c.is_ascii_lowercase())
         && letters.all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')

@@ -53,7 +53,7 @@ impl std::error::Error for Diagnostics {}
 
 /// Whether a letter invisibly reverses the text around it or ends its line: a name with one is shown
 /// differently from its text ("Trojan Source"), and compilers refuse it.
-pub(crate) fn is_unseen(c: char) -> bool {
+pub fn is_unseen(c: char) -> bool {
     matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
