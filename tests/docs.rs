@@ -73,7 +73,9 @@ fn the_architecture_names_every_folder_of_the_sources() {
     let text = std::fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
     let crates = ["controller", "bus", "logs", "identification", "explanation", "virtual-arm", "commands"];
     let crates = crates.map(|name| format!("powerball/{name}/src"));
-    for krate in crates.iter().map(String::as_str).chain(["dyngen/arm/src", "dyngen/src"]) {
+    for krate in
+        crates.iter().map(String::as_str).chain(["dyngen/arm/src", "dyngen/verify/src", "dyngen/src"])
+    {
         for entry in std::fs::read_dir(root().join(krate)).unwrap() {
             let entry = entry.unwrap();
             if entry.file_type().unwrap().is_dir() {

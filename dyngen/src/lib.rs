@@ -77,12 +77,12 @@ pub mod parameters;
 pub mod prove;
 pub mod rounding;
 mod values;
-pub mod verify;
 
 pub use config::{Config, GenerateError};
 pub use dyngen_arm::{Arm, Diagnostic, Diagnostics, Function, Language, arm, diagnostic};
 #[doc(hidden)]
 pub use dyngen_arm::{exact, file};
+pub use dyngen_verify as verify;
 pub use emit::FrictionTerm;
 pub use evaluator::{Evaluator, Samples};
 pub use model::{Error, Model};

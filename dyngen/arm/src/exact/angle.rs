@@ -1,8 +1,9 @@
 //! Angles, exact if the file gives them exactly.
 
 use super::rational::{self, Rational};
-use num_traits::{Signed, Zero};
-use std::f64::consts::PI;
+use dashu_int::IBig;
+use num_traits::{FromPrimitive, One, Signed, Zero};
+use std::f64::consts::{PI, TAU};
 use std::fmt;
 
 /// A constant angle of the kinematics, in radians.
@@ -146,6 +147,28 @@ impl fmt::Display for Angle {
     }
 }
 
+/// A rational point of the circle within 1e-12 rad of an angle: from the tangent of its half by its continued
+/// fraction.
+pub fn circle_point_near(angle: f64) -> (Rational, Rational) {
+    let tangent = (angle.rem_euclid(TAU) / 2.0).tan();
+    let mut rest = tangent;
+    let (mut before, mut t) = ([IBig::zero(), IBig::one()], [IBig::one(), IBig::zero()]);
+    for _ in 0..40 {
+        let whole = rest.floor();
+        let Some(count) = IBig::from_f64(whole) else { break };
+        let next = [&count * &t[0] + &before[0], &count * &t[1] + &before[1]];
+        (before, t) = (t, next);
+        let value = rational::to_f64(&rational::ratio(t[0].clone(), t[1].clone()));
+        if (value - tangent).abs() < 4e-13 * (1.0 + tangent * tangent) || rest == whole {
+            break;
+        }
+        rest = 1.0 / (rest - whole);
+    }
+    let [p, q] = t;
+    let (square, scale) = (&q * &q - &p * &p, &q * &q + &p * &p);
+    (rational::ratio(&p * &q * 2, scale.clone()), rational::ratio(square, scale))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -177,5 +200,19 @@ mod tests {
         assert_eq!(angle.quarter_turns(), None);
         assert!(angle.looks_rounded().unwrap().contains("pi/2"));
         assert!(Angle::parse("1.2").unwrap().looks_rounded().is_none());
+    }
+
+    #[test]
+    fn a_point_of_the_circle_is_near_its_angle() {
+        for k in -50..50 {
+            let angle = 0.137 * f64::from(k);
+            let (s, c) = circle_point_near(angle);
+            assert_eq!(&s * &s + &c * &c, rational::integer(1));
+            assert!(
+                (rational::to_f64(&s) - angle.sin()).abs() < 2e-12
+                    && (rational::to_f64(&c) - angle.cos()).abs() < 2e-12,
+                "{angle}"
+            );
+        }
     }
 }

@@ -1,17 +1,17 @@
 //! A text as tokens, read one after the other, and what the languages share that write expressions as C does.
 
 use super::head::Literals;
-use super::language::{Expr, Kind, Let, Pattern};
-use super::{Checked, wrong};
+use crate::language::{Expr, Kind, Let, Pattern};
+use crate::{Checked, wrong};
 
 /// Where such languages differ.
-pub(super) struct Dialect {
+pub(crate) struct Dialect {
     /// What begins and ends a comment.
-    pub(super) comment: (&'static str, &'static str),
+    pub(crate) comment: (&'static str, &'static str),
     /// What stands between a struct and its field.
-    pub(super) field: &'static str,
+    pub(crate) field: &'static str,
     /// What stands before a number, and at its end.
-    pub(super) number: (&'static str, &'static str),
+    pub(crate) number: (&'static str, &'static str),
 }
 
 /// Words, numbers, strings, lines of the preprocessor and single characters (`->` is one), each with its
@@ -56,21 +56,21 @@ fn tokens(text: &str, dialect: &Dialect) -> Vec<(usize, String)> {
 }
 
 /// Where a text is read.
-pub(super) struct Cursor<'a> {
+pub(crate) struct Cursor<'a> {
     dialect: &'a Dialect,
     literals: &'a Literals,
     tokens: std::iter::Peekable<std::vec::IntoIter<(usize, String)>>,
     last: usize,
     /// Where literals stand: the function, then a space and the name of a value.
-    pub(super) place: String,
+    pub(crate) place: String,
     /// The function that gives x·y + z; empty where the file has none.
-    pub(super) fused: &'static str,
+    pub(crate) fused: &'static str,
     /// Literals of many digits that the head does not explain, with their lines.
-    pub(super) unexplained: Vec<(usize, String)>,
+    pub(crate) unexplained: Vec<(usize, String)>,
 }
 
 impl<'a> Cursor<'a> {
-    pub(super) fn new(text: &str, dialect: &'a Dialect, literals: &'a Literals) -> Cursor<'a> {
+    pub(crate) fn new(text: &str, dialect: &'a Dialect, literals: &'a Literals) -> Cursor<'a> {
         let all = tokens(text, dialect);
         Cursor {
             dialect,
@@ -83,24 +83,24 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    pub(super) fn peek(&mut self) -> Option<&str> {
+    pub(crate) fn peek(&mut self) -> Option<&str> {
         self.tokens.peek().map(|token| token.1.as_str())
     }
 
-    pub(super) fn line(&mut self) -> usize {
+    pub(crate) fn line(&mut self) -> usize {
         self.tokens.peek().map_or(self.last, |token| token.0)
     }
 
-    pub(super) fn next(&mut self) -> String {
+    pub(crate) fn next(&mut self) -> String {
         self.tokens.next().map_or(String::new(), |token| token.1)
     }
 
-    pub(super) fn takes(&mut self, wanted: &str) -> bool {
+    pub(crate) fn takes(&mut self, wanted: &str) -> bool {
         self.peek() == Some(wanted) && self.tokens.next().is_some()
     }
 
     /// The next tokens must be these, separated by spaces.
-    pub(super) fn expect(&mut self, wanted: &str) -> Checked<()> {
+    pub(crate) fn expect(&mut self, wanted: &str) -> Checked<()> {
         for token in wanted.split(' ') {
             let line = self.line();
             if !self.takes(token) {
@@ -111,7 +111,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// A text must stand here; `instead` says what is wrong where it does not.
-    pub(super) fn text(&mut self, wanted: &str, instead: &str) -> Checked<()> {
+    pub(crate) fn text(&mut self, wanted: &str, instead: &str) -> Checked<()> {
         for (_, token) in tokens(wanted, self.dialect) {
             let line = self.line();
             if !self.takes(&token) {
@@ -122,7 +122,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// The tokens before one that begins with any of some characters.
-    pub(super) fn until(&mut self, ends: &str) -> Vec<String> {
+    pub(crate) fn until(&mut self, ends: &str) -> Vec<String> {
         let mut words = Vec::new();
         while self.peek().is_some_and(|token| !token.starts_with(|c| ends.contains(c))) {
             words.push(self.next());
@@ -131,7 +131,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// `[k]`
-    pub(super) fn index(&mut self) -> Checked<usize> {
+    pub(crate) fn index(&mut self) -> Checked<usize> {
         self.expect("[")?;
         let line = self.line();
         let Ok(index) = self.next().parse() else { return wrong(line, "a number is expected here") };
@@ -140,12 +140,12 @@ impl<'a> Cursor<'a> {
     }
 
     /// `NAME = …;`, a sum.
-    pub(super) fn named(&mut self) -> Checked<Let> {
+    pub(crate) fn named(&mut self) -> Checked<Let> {
         self.named_by(Self::sum)
     }
 
     /// `NAME = …;`
-    pub(super) fn named_by(&mut self, value: impl FnOnce(&mut Self) -> Checked<Expr>) -> Checked<Let> {
+    pub(crate) fn named_by(&mut self, value: impl FnOnce(&mut Self) -> Checked<Expr>) -> Checked<Let> {
         let name = self.next();
         let outside = std::mem::take(&mut self.place);
         self.place = format!("{outside} {name}");
@@ -156,7 +156,7 @@ impl<'a> Cursor<'a> {
         Ok(Let { pattern: Pattern::Name(name), value })
     }
 
-    pub(super) fn sum(&mut self) -> Checked<Expr> {
+    pub(crate) fn sum(&mut self) -> Checked<Expr> {
         self.operations(&["+", "-"])
     }
 
@@ -200,6 +200,12 @@ impl<'a> Cursor<'a> {
                 };
                 self.literal(line, digits)?
             }
+            name @ ("sign" | "tangent") if self.takes("(") => {
+                let name = if name == "sign" { "sign" } else { "tanh" };
+                let of = Box::new(self.sum()?);
+                self.expect(")")?;
+                Kind::Free(name, of)
+            }
             name if name == self.fused && self.takes("(") => return self.product_and_sum(line),
             word if word.starts_with(|c: char| c.is_ascii_lowercase()) => {
                 let name = Expr { line, kind: Kind::Name(word.to_string()) };
@@ -215,8 +221,10 @@ impl<'a> Cursor<'a> {
                     Kind::Index(Box::new(list), self.index()?)
                 } else if self.peek() == Some("[") {
                     // A vector is the one column of a matrix.
-                    let column = Expr { line, kind: Kind::Index(Box::new(name), 0) };
-                    Kind::Index(Box::new(column), self.index()?)
+                    let row = self.index()?;
+                    let column = if self.peek() == Some("[") { self.index()? } else { 0 };
+                    let column = Expr { line, kind: Kind::Index(Box::new(name), column) };
+                    Kind::Index(Box::new(column), row)
                 } else {
                     return Ok(name);
                 }

@@ -1,24 +1,32 @@
-//! What is printed in a generated file against the Lagrangian: the text is read back, evaluated modulo the
-//! prime at points of its own, and compared.
+//! What is printed in a generated file against the Lagrangian: the text is read back, evaluated modulo a
+//! prime at random points, and compared.
 //!
-//! Trusted are this folder, the Lagrangian with the algebra below it, and that a compiler does what the text
-//! says. The recursions, the optimiser and the printer are not.
+//! Nothing here is the generator's: the Lagrangian, the sines of its angles and the readers of four languages
+//! are this crate's own. What one must trust is in `docs/dyngen.md`.
 
-mod c;
+mod angles;
 mod check;
-mod cursor;
-mod head;
-mod kernel;
+mod dual;
+mod friction;
+mod functions;
+mod lagrangian;
 mod language;
-mod rust;
-mod wgsl;
+mod matrix;
+mod point;
+mod read;
+mod sums;
+#[doc(hidden)]
+pub mod text;
 
 pub use check::{Error, Verifier};
 
-use crate::dynamics::Function;
+use dyngen_arm::Function;
 use language::Routines;
 use std::collections::BTreeMap;
 use std::fmt;
+
+/// For an angle, from 0, the line, and coordinates with their signs.
+type Angles = BTreeMap<usize, (usize, Vec<(usize, i64)>)>;
 
 /// What is in a file.
 #[derive(Debug, Default)]
@@ -28,6 +36,10 @@ struct Source {
     constants: BTreeMap<String, (usize, Vec<String>)>,
     /// Modules of frames, with their lines.
     modules: Vec<(String, usize)>,
+    /// What comments say of angles that are sums of coordinates.
+    angles: Angles,
+    /// Terms of friction, as comments list them.
+    terms: Vec<String>,
     not_checked: Vec<String>,
     /// Kernels and entry points: each calls a function for many states, and does nothing else.
     kernels: Vec<String>,
@@ -41,7 +53,9 @@ fn routine(name: &str, frames: &[String]) -> Option<String> {
     let is_known = |name: &str| Function::parse(name.strip_suffix("_with").unwrap_or(name)).is_some();
     match name {
         "trig_of" => return Some("Trig::new".to_string()),
-        name if name == "prepare" || is_known(name) => return Some(name.to_string()),
+        name if ["prepare", "friction_columns", "friction"].contains(&name) || is_known(name) => {
+            return Some(name.to_string());
+        }
         _ => {}
     }
     let inside = |frame: &String| {

@@ -2,13 +2,13 @@
 
 mod cuda;
 
-use super::cursor::{Cursor, Dialect};
-use super::head::Literals;
-use super::language::{Exact, Expr, Kind, Let, Pattern, Routine};
-use super::{Checked, Source, wrong};
-use crate::dynamics::Function;
-use crate::dynamics::function::Size;
-use crate::exact::rational::integer;
+use crate::language::{Exact, Expr, Kind, Let, Pattern, Routine};
+use crate::read::cursor::{Cursor, Dialect};
+use crate::read::head::Literals;
+use crate::{Checked, Source, wrong};
+use dyngen_arm::Function;
+use dyngen_arm::exact::rational::integer;
+use dyngen_arm::function::Size;
 use num_traits::Zero;
 use std::collections::BTreeMap;
 
@@ -53,14 +53,26 @@ const FUSED: &str = "
 #define fused(x, y, z) fma(x, y, z)
 #endif
 ";
+/// The sign that Coulomb's friction takes, behind its name.
+const SIGN: &str =
+    "(real x) { return (x > (real)0.0) ? (real)1.0 : ((x < (real)0.0) ? (real)-1.0 : (real)0.0); }";
+/// The hyperbolic tangent of the file's numbers, behind its name.
+const TANGENT: &str = "(real x)
+{
+#ifdef NAME_FLOAT
+    return tanhf(x);
+#else
+    return tanh(x);
+#endif
+}";
 /// Sines and cosines, tested where they are written.
-const TRIGONOMETRY: &str = include_str!("../../emit/c/trigonometry.c");
+const TRIGONOMETRY: &str = crate::text::TRIGONOMETRY_C;
 
 /// Numbers are cast: `(real)0.5`.
 const DIALECT: Dialect = Dialect { comment: ("/*", "*/"), field: "->", number: ("real", "") };
 
 /// Reads a file in C, or in CUDA; `frames` are those of the arm.
-pub(super) fn read(text: &str, is_cuda: bool, literals: &Literals, frames: &[String]) -> Checked<Source> {
+pub(crate) fn read(text: &str, is_cuda: bool, literals: &Literals, frames: &[String]) -> Checked<Source> {
     let mut reader = Reader {
         text: Cursor::new(text, &DIALECT, literals),
         is_cuda,
@@ -145,10 +157,9 @@ impl Reader<'_> {
             false => kind,
         };
         match (kind.as_str(), name.as_str()) {
-            ("static real", "sign" | "tangent") | ("void", "friction" | "friction_columns") => {
-                self.skip(name, "}")
-            }
-            ("const double", "motor_velocities") => self.skip(name, ";"),
+            ("static real", "sign") => self.text.text(SIGN, OTHER),
+            ("static real", "tangent") => self.text.text(&TANGENT.replace("NAME", &self.upper()), OTHER),
+            ("const double", "motor_velocities") => self.motor_velocities(line),
             ("const char * const", "joint_names" | "parameter_names")
             | ("const double", "parameter_values") => self.constant(line, name.to_uppercase()),
             (kind, _) if kind == "void" || kind == format!("{}real", self.prefix) => {
@@ -158,22 +169,19 @@ impl Reader<'_> {
         }
     }
 
-    /// An item that is not looked into.
-    fn skip(&mut self, name: String, end: &str) -> Checked<()> {
-        let mut depth = 0;
-        while self.text.peek().is_some() {
-            let line = self.text.line();
-            let token = self.text.next();
-            // A macro would change what stands behind it.
-            if token.starts_with('#') && name != "tangent" {
-                return wrong(line, "a line of the preprocessor that dyngen does not write");
-            }
-            depth += i32::from(token == "{") - i32::from(token == "}");
-            if depth == 0 && token == end {
-                break;
+    /// The numbers of a matrix, row by row.
+    fn motor_velocities(&mut self, line: usize) -> Checked<()> {
+        self.text.until("=");
+        let mut entries = vec![String::new()];
+        while self.text.peek().is_some_and(|token| token != ";") {
+            match self.text.next().as_str() {
+                "," => entries.push(String::new()),
+                "=" | "{" | "}" => {}
+                part => entries.last_mut().into_iter().for_each(|entry| *entry += part),
             }
         }
-        self.source.not_checked.push(name);
+        self.text.expect(";")?;
+        self.source.constants.insert("MOTOR_VELOCITIES".to_string(), (line, entries));
         Ok(())
     }
 
@@ -198,14 +206,14 @@ impl Reader<'_> {
 
     /// The name that a function has in the language.
     fn routine(&self, name: &str) -> Option<String> {
-        super::routine(name, self.frames)
+        crate::routine(name, self.frames)
     }
 
     fn function(&mut self, line: usize, name: &str) -> Checked<()> {
         let Some(name) = self.routine(name) else {
             return wrong(line, &format!("dyngen writes no function {name}"));
         };
-        let parameters = self.parameters()?;
+        let parameters = self.parameters(&name)?;
         self.text.place = name.clone();
         let mut body = Body { lets: Vec::new(), slots: BTreeMap::new(), results: Vec::new(), called: None };
         self.text.expect("{")?;
@@ -244,7 +252,7 @@ impl Reader<'_> {
     }
 
     /// The names of what a function reads.
-    fn parameters(&mut self) -> Checked<Vec<String>> {
+    fn parameters(&mut self, name: &str) -> Checked<Vec<String>> {
         let mut read = Vec::new();
         self.text.expect("(")?;
         loop {
@@ -258,11 +266,16 @@ impl Reader<'_> {
                 }
                 ["const", "real", name @ "f", "[", "6", "]"]
                 | ["const", "real", name @ "payload", "[", "10", "]"] => read.push(name.to_string()),
+                ["const", "real", "coefficients", "[", "JOINTS", "]", "[", "FRICTION_TERMS", "]"] => {
+                    read.push("coefficients".to_string());
+                }
                 ["const", "real", "parameters", "[", "PARAMETERS", "]"] => {
                     read.push("parameters".to_string())
                 }
                 ["const", "real", name, "[", "JOINTS", "]"] => read.push(name.to_string()),
-                ["trig", "*", "trig"] | ["prepared", "*", "prepared"] | ["real", "result", ..] => {}
+                ["trig", "*", "trig"] if name == "Trig::new" => {}
+                ["prepared", "*", "prepared"] if name == "prepare" => {}
+                ["real", "result", ..] if text == result_of(name) => {}
                 _ => return wrong(line, "a parameter that dyngen does not write"),
             }
             if !self.text.takes(",") {
@@ -297,6 +310,17 @@ impl Reader<'_> {
                 self.text.expect("void )")?;
                 self.text.next();
                 self.text.expect(";")
+            }
+            (_, Some("real")) if !done => {
+                let upper = self.upper();
+                self.text.expect(&format!("columns [ {upper}_JOINTS ] [ {upper}_FRICTION_TERMS ] ;"))
+            }
+            (_, Some("friction_columns")) if !done => {
+                self.text.expect("( dq , columns ) ;")?;
+                let dq = Expr { line, kind: Kind::Name("dq".to_string()) };
+                let value = Expr { line, kind: Kind::Call("friction_columns".to_string(), vec![dq]) };
+                body.lets.push(Let { pattern: Pattern::Name("columns".to_string()), value });
+                Ok(())
             }
             (_, Some("trig")) => self.text.expect("trig ;"),
             (_, Some("prepared")) => self.text.expect("prepared ;"),
@@ -421,6 +445,24 @@ impl Body {
         };
         Expr { line, kind: Kind::Record(["sin", "cos", "position"].map(list).into()) }
     }
+}
+
+/// The parameter that a function's result is written to.
+fn result_of(name: &str) -> String {
+    let of = name.rsplit("::").next().unwrap_or(name).trim_end_matches("_with");
+    let length = |size: Size| match size {
+        Size::Joints => "[ JOINTS ]".to_string(),
+        Size::Parameters => "[ PARAMETERS ]".to_string(),
+        Size::Fixed(length) => format!("[ {length} ]"),
+    };
+    let shape = match (of, Function::parse(of).map(Function::size)) {
+        ("friction", _) => length(Size::Joints),
+        ("friction_columns", _) => "[ JOINTS ] [ FRICTION_TERMS ]".to_string(),
+        (_, Some((Size::Fixed(1), size) | (size, Size::Fixed(1)))) => length(size),
+        (_, Some((rows, columns))) => format!("{} {}", length(rows), length(columns)),
+        _ => String::new(),
+    };
+    format!("real result {shape}")
 }
 
 /// A result as a list of columns; every entry must be written once, in order.

@@ -2,10 +2,10 @@
 //! at.
 
 use super::head::Literals;
-use super::language::{Exact, Expr, Kind, Let, Pattern, Routine};
-use super::{Checked, Source, wrong};
-use crate::dynamics::Function;
-use crate::emit;
+use crate::language::{Exact, Expr, Kind, Let, Pattern, Routine};
+use crate::text;
+use crate::{Checked, Source, wrong};
+use dyngen_arm::Function;
 use num_traits::Zero;
 use proc_macro2::{TokenStream, TokenTree};
 use quote::ToTokens;
@@ -25,16 +25,18 @@ const AROUND: &str = "
     }
     impl<T: Copy> Parameters<T> for Prepared<T> { fn prepared(&self) -> Prepared<T> { *self } }
     fn fused<T: SimdRealField + Copy>(x: T, y: T, z: T) -> T { x.simd_mul_add(y, z) }
+    fn sign<T: SimdRealField + Copy>(x: T) -> T {
+        let (zero, one) = (T::zero(), T::one());
+        one.select(x.simd_gt(zero), (-one).select(x.simd_lt(zero), zero))
+    }
 ";
 /// Sines and cosines, tested where they are written.
-const TRIGONOMETRY: &str = include_str!("../emit/trigonometry.rs");
+const TRIGONOMETRY: &str = text::TRIGONOMETRY;
 /// The function that gives x·y + z.
 const FUSED: &str = "fused";
-/// Items that are read by nothing that is proven.
-const UNREAD: [&str; 5] = ["FRICTION_TERMS", "MOTOR_VELOCITIES", "sign", "friction_columns", "friction"];
 
 /// Tokens as text, without attributes and without commas before a closing bracket.
-fn plain(tokens: impl ToTokens) -> String {
+pub(super) fn plain(tokens: impl ToTokens) -> String {
     fn write(tokens: TokenStream, text: &mut String) {
         let mut tokens = tokens.into_iter().peekable();
         while let Some(token) = tokens.next() {
@@ -67,12 +69,12 @@ fn plain(tokens: impl ToTokens) -> String {
     text
 }
 
-fn line(of: &impl Spanned) -> usize {
+pub(super) fn line(of: &impl Spanned) -> usize {
     of.span().start().line
 }
 
 /// Reads a file.
-pub(super) fn read(text: &str, literals: &Literals) -> Checked<Source> {
+pub(crate) fn read(text: &str, literals: &Literals) -> Checked<Source> {
     let file = match syn::parse_file(text) {
         Ok(file) => file,
         Err(e) => return wrong(e.span().start().line, &e.to_string()),
@@ -100,16 +102,16 @@ fn names(items: &[syn::Item]) -> BTreeSet<String> {
     items.iter().filter_map(name).collect()
 }
 
-struct Reader<'a> {
+pub(super) struct Reader<'a> {
     literals: &'a Literals,
     around: BTreeSet<String>,
     /// `name::` of the module that is read.
-    module: String,
+    pub(super) module: String,
     /// The functions of the file and of that module.
     own: Vec<BTreeSet<String>>,
     /// Where literals stand: the function, then a space and the name in a `let`.
-    place: String,
-    source: Source,
+    pub(super) place: String,
+    pub(super) source: Source,
 }
 
 impl Reader<'_> {
@@ -122,15 +124,12 @@ impl Reader<'_> {
             syn::Item::Fn(f) => {
                 harmless(&f.attrs)?;
                 let name = f.sig.ident.to_string();
-                if UNREAD.contains(&name.as_str()) {
-                    self.source.not_checked.push(format!("{}{name}", self.module));
-                    return Ok(());
-                }
-                if name == FUSED && self.around.contains(&plain(item)) {
+                if [FUSED, "sign"].contains(&name.as_str()) && self.around.contains(&plain(item)) {
                     return Ok(());
                 }
                 let known = Function::parse(name.strip_suffix("_with").unwrap_or(&name)).is_some();
-                if !known && name != "prepare" && !name.starts_with("angles_") {
+                let other = ["prepare", "friction_columns", "friction"].contains(&name.as_str());
+                if !known && !other && !name.starts_with("angles_") {
                     return wrong(line(f), &format!("dyngen writes no function {name}"));
                 }
                 self.function(&f.sig, &f.block, name)
@@ -179,16 +178,14 @@ impl Reader<'_> {
                 return as_written(items, WRITTEN.get_or_init(|| formatted_items(TRIGONOMETRY)), &name);
             }
             "discrete" if self.module.is_empty() => {
-                let text = |baked| emit::discrete::text(baked).to_string();
-                let inner = |text: String| match syn::parse_str::<syn::ItemMod>(&text).map(|m| m.content) {
-                    Ok(Some((_, items))) => items.iter().map(formatted).collect(),
-                    _ => Vec::new(),
-                };
                 let baked = self.source.constants.contains_key("PARAMETER_VALUES");
-                return as_written(items, &inner(text(baked)), &name);
+                return as_written(items, &formatted_items(&text::discrete(baked)), &name);
             }
             "tests" if item.attrs.first().is_some_and(|a| plain(&a.meta) == "cfg ( test ) ") => {}
-            "batch" => harmless(&item.attrs)?,
+            "batch" => {
+                harmless(&item.attrs)?;
+                return self.batch(items);
+            }
             _ if self.module.is_empty() => {
                 harmless(&item.attrs)?;
                 self.module = format!("{name}::");
@@ -207,14 +204,19 @@ impl Reader<'_> {
 
     fn constant(&mut self, item: &syn::ItemConst) -> Checked<()> {
         let name = item.ident.to_string();
-        if UNREAD.contains(&name.as_str()) {
-            self.source.not_checked.push(name);
-            return Ok(());
-        }
-        let known = ["JOINTS", "JOINT_NAMES", "PARAMETERS", "PARAMETER_NAMES", "PARAMETER_VALUES", "ANGLES"];
+        let known = [
+            "FRICTION_TERMS",
+            "MOTOR_VELOCITIES",
+            "JOINTS",
+            "JOINT_NAMES",
+            "PARAMETERS",
+            "PARAMETER_NAMES",
+            "PARAMETER_VALUES",
+            "ANGLES",
+        ];
         let structure = name.strip_suffix("_NONZERO").and_then(|f| Function::parse(&f.to_lowercase()));
         let name = match structure {
-            Some(function) => super::structure_of(&format!("{}{function}", self.module)),
+            Some(function) => crate::structure_of(&format!("{}{function}", self.module)),
             None => name,
         };
         if structure.is_none() && (!known.contains(&name.as_str()) || !self.module.is_empty()) {
@@ -244,6 +246,7 @@ impl Reader<'_> {
                 "trig" => kind == "& Trig < T > ",
                 "f" => kind == "& SVector < T , 6 > ",
                 "payload" => kind == "& SVector < T , 10 > ",
+                "coefficients" => kind == "& SMatrix < T , JOINTS , FRICTION_TERMS > ",
                 "parameters" => kind == "& SVector < T , PARAMETERS > " || kind == "& impl Parameters < T > ",
                 _ => kind == "& SVector < T , JOINTS > ",
             };
@@ -293,7 +296,7 @@ impl Reader<'_> {
         self.expression(e).map(Box::new)
     }
 
-    fn expression(&mut self, e: &syn::Expr) -> Checked<Expr> {
+    pub(super) fn expression(&mut self, e: &syn::Expr) -> Checked<Expr> {
         let at = line(e);
         let unknown = || wrong(at, "an expression that dyngen does not write");
         let kind = match e {
@@ -341,6 +344,8 @@ impl Reader<'_> {
                 }
                 _ => return unknown(),
             },
+            // One sample of a batch: its number among them is the same everywhere.
+            syn::Expr::Index(index) if plain(&index.index) == "lane " => return self.expression(&index.expr),
             syn::Expr::Index(index) => match plain(&index.index).trim().parse() {
                 Ok(number) => Kind::Index(self.boxed(&index.expr)?, number),
                 Err(_) => return unknown(),
@@ -349,6 +354,17 @@ impl Reader<'_> {
                 if call.method == "prepared" && call.args.is_empty() && call.turbofish.is_none() =>
             {
                 Kind::Prepared(self.boxed(&call.receiver)?)
+            }
+            syn::Expr::MethodCall(call) if call.turbofish.is_none() => {
+                match (call.method.to_string().as_str(), &*call.receiver, call.args.is_empty()) {
+                    ("simd_tanh", of, true) => Kind::Free("tanh", self.boxed(of)?),
+                    ("column_sum", syn::Expr::MethodCall(product), true)
+                        if product.method == "component_mul" && product.args.len() == 1 =>
+                    {
+                        Kind::RowSums(self.boxed(&product.receiver)?, self.boxed(&product.args[0])?)
+                    }
+                    _ => return unknown(),
+                }
             }
             syn::Expr::Call(call) => self.call(at, call)?,
             _ => return unknown(),
@@ -359,7 +375,8 @@ impl Reader<'_> {
     fn call(&mut self, at: usize, call: &syn::ExprCall) -> Checked<Kind> {
         let (function, arguments) = (plain(&call.func), &call.args);
         let function = function.trim_end();
-        let number = |n: i64| Kind::Number(Exact::Number(crate::exact::rational::integer(n), Zero::zero()));
+        let number =
+            |n: i64| Kind::Number(Exact::Number(dyngen_arm::exact::rational::integer(n), Zero::zero()));
         Ok(match (function, arguments.len()) {
             ("nalgebra :: convert" | "nalgebra :: convert :: < f64 , T >", 1) => {
                 self.literal(at, &arguments[0])?
@@ -375,12 +392,16 @@ impl Reader<'_> {
                 let angles = Kind::Call(plain(&arguments[1]).trim().to_string(), of);
                 Kind::SinCos(Box::new(Expr { line: at, kind: angles }))
             }
+            ("trigonometry :: near", 1) => Kind::SinCos(Box::new(self.expression(&arguments[0])?)),
+            ("sign", 1) => Kind::Free("sign", self.boxed(&arguments[0])?),
             (FUSED, 3) => match <[Expr; 3]>::try_from(self.expressions(arguments)?) {
                 Ok(of) => return Ok(Expr::fused(at, of).kind),
                 Err(_) => return wrong(at, "three numbers are expected here"),
             },
             ("Trig :: new", 1) => Kind::Call("Trig::new".to_string(), self.expressions(arguments)?),
             (name, _) => {
+                // Of a batch form the function of one sample is that of the module around it.
+                let name = name.strip_prefix("super :: ").unwrap_or(name);
                 let inside = self.own.len() > 1 && self.own.last().is_some_and(|own| own.contains(name));
                 let name = if inside { format!("{}{name}", self.module) } else { name.to_string() };
                 if !inside && !self.own[0].contains(&name) {
@@ -419,7 +440,7 @@ fn constant_text(e: &syn::Expr) -> String {
     }
 }
 
-fn pattern(of: &syn::Pat) -> Checked<Pattern> {
+pub(super) fn pattern(of: &syn::Pat) -> Checked<Pattern> {
     let list = |of: &syn::punctuated::Punctuated<syn::Pat, _>| of.iter().map(pattern).collect::<Checked<_>>();
     Ok(match of {
         syn::Pat::Wild(_) => Pattern::Ignored,
@@ -445,7 +466,7 @@ fn is_condition(item: &syn::ItemConst) -> bool {
 }
 
 /// Attributes that change nothing of what is computed.
-fn harmless(attributes: &[syn::Attribute]) -> Checked<()> {
+pub(super) fn harmless(attributes: &[syn::Attribute]) -> Checked<()> {
     let known = ["doc", "allow", "must_use", "inline", "derive"];
     match attributes.iter().find(|a| !known.iter().any(|name| a.path().is_ident(name))) {
         Some(other) => wrong(line(other), "an attribute that dyngen does not write"),
@@ -454,7 +475,7 @@ fn harmless(attributes: &[syn::Attribute]) -> Checked<()> {
 }
 
 /// An item as a formatter leaves it, which adds braces.
-fn formatted(item: &syn::Item) -> String {
+pub(super) fn formatted(item: &syn::Item) -> String {
     let file = syn::File { shebang: None, frontmatter: None, attrs: Vec::new(), items: vec![item.clone()] };
     syn::parse_file(&prettyplease::unparse(&file)).map(plain).unwrap_or_default()
 }

@@ -1,14 +1,14 @@
 //! What kernels in CUDA and entry points in WGSL must be: the text of each, from its function alone.
 
-use super::{Checked, Source, wrong};
-use crate::dynamics::Function;
-use crate::dynamics::function::{Argument, Size};
+use crate::{Checked, Source, wrong};
+use dyngen_arm::Function;
+use dyngen_arm::function::{Argument, Size};
 
 /// More joints or parameters than this no arm has.
 const MOST: usize = 1000;
 
 /// A number of joints, parameters or angles, which a file must say before it is used.
-pub(super) fn size(source: &Source, line: usize, name: &str) -> Checked<usize> {
+pub(crate) fn size(source: &Source, line: usize, name: &str) -> Checked<usize> {
     let number = source.constants.get(name).and_then(|(_, entries)| entries.first()?.parse().ok());
     match number.filter(|n: &usize| *n <= MOST) {
         Some(number) => Ok(number),
@@ -17,7 +17,7 @@ pub(super) fn size(source: &Source, line: usize, name: &str) -> Checked<usize> {
 }
 
 /// A function that is called for many states.
-pub(super) struct Kernel<'a> {
+pub(crate) struct Kernel<'a> {
     /// In the file.
     name: &'a str,
     /// `name_` of the arm.
@@ -33,7 +33,7 @@ pub(super) struct Kernel<'a> {
 
 impl<'a> Kernel<'a> {
     /// For a function of a file, whose constants were read before.
-    pub(super) fn new(
+    pub(crate) fn new(
         source: &Source,
         line: usize,
         name: &'a str,
@@ -58,7 +58,7 @@ impl<'a> Kernel<'a> {
     }
 
     /// What stands behind the name.
-    pub(super) fn in_cuda(&self) -> String {
+    pub(crate) fn in_cuda(&self) -> String {
         let Kernel { name, prefix, .. } = self;
         let mut text = "(size_t count,".to_string();
         for (argument, _) in &self.arguments {
@@ -100,7 +100,7 @@ impl<'a> Kernel<'a> {
     }
 
     /// What stands behind the name.
-    pub(super) fn in_wgsl(&self) -> String {
+    pub(crate) fn in_wgsl(&self) -> String {
         let Kernel { name, prefix, .. } = self;
         let mut text = format!(
             "(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,) {{

@@ -154,7 +154,7 @@ fn a_single_is_within_one_unit_of_the_last_place_wherever_it_is() {
 
 /// What bounds of rounding rest on: the error in units of 2⁻²⁴, of every angle up to 1000 rad.
 #[test]
-#[ignore = "minutes: cargo test --release -p dyngen --lib every_single -- --ignored"]
+#[ignore = "minutes: cargo test --release -p dyngen-verify --lib every_single -- --ignored"]
 fn every_single_up_to_a_thousand_radians_is_within_0_85_units() {
     let unit = 0.85 * f64::from(f32::EPSILON) / 2.0;
     for bits in 0..=1000f32.to_bits() {

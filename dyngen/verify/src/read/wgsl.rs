@@ -3,17 +3,17 @@
 use super::cursor::{Cursor, Dialect};
 use super::head::Literals;
 use super::kernel::{Kernel, size};
-use super::language::{Expr, Kind, Let, Routine};
-use super::{Checked, Source, wrong};
-use crate::dynamics::Function;
-use crate::dynamics::function::Argument;
+use crate::language::{Expr, Kind, Let, Routine};
+use crate::{Checked, Source, wrong};
+use dyngen_arm::Function;
+use dyngen_arm::function::Argument;
 use std::collections::BTreeSet;
 
 /// Numbers have a suffix: `0.5f`.
 const DIALECT: Dialect = Dialect { comment: ("//", "\n"), field: ".", number: ("", "f") };
 
 /// Sines and cosines, tested where they are written.
-const TRIGONOMETRY: &str = include_str!("../emit/wgsl/trigonometry.wgsl");
+const TRIGONOMETRY: &str = crate::text::TRIGONOMETRY_WGSL;
 
 /// The fields of the struct of sines and cosines, with the constants that are their lengths.
 const TRIG: [(&str, &str); 3] = [("sin", "ANGLES"), ("cos", "ANGLES"), ("position", "JOINTS")];
@@ -22,7 +22,7 @@ const TRIG: [(&str, &str); 3] = [("sin", "ANGLES"), ("cos", "ANGLES"), ("positio
 const LINE_BREAKS: [char; 6] = ['\u{b}', '\u{c}', '\r', '\u{85}', '\u{2028}', '\u{2029}'];
 
 /// Reads a file; `frames` are those of the arm.
-pub(super) fn read(text: &str, literals: &Literals, frames: &[String]) -> Checked<Source> {
+pub(crate) fn read(text: &str, literals: &Literals, frames: &[String]) -> Checked<Source> {
     let broken = text.lines().position(|line| line.contains(LINE_BREAKS));
     // `lines` takes "\r\n" for one end of a line.
     if let Some(line) = broken.or_else(|| text.find('\r').map(|_| 0)) {
@@ -211,7 +211,7 @@ impl Reader<'_> {
 
     fn function(&mut self, line: usize) -> Checked<()> {
         let name = self.own_name()?;
-        let Some(name) = super::routine(&name, self.frames) else {
+        let Some(name) = crate::routine(&name, self.frames) else {
             return wrong(line, &format!("dyngen writes no function {name}"));
         };
         let parameters = self.parameters()?;
@@ -359,7 +359,7 @@ impl Reader<'_> {
         self.text.expect("compute @ workgroup_size ( 64 ) fn")?;
         let name = self.own_name()?;
         let called =
-            name.strip_suffix("_batch").and_then(|name| Some((name, super::routine(name, self.frames)?)));
+            name.strip_suffix("_batch").and_then(|name| Some((name, crate::routine(name, self.frames)?)));
         let function = called.as_ref().and_then(|(_, routine)| Function::parse(routine.rsplit("::").next()?));
         let (Some((called, routine)), Some(function)) = (called, function) else {
             return wrong(line, &format!("dyngen writes no entry point {name}"));

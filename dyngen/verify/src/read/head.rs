@@ -1,20 +1,22 @@
 //! What the head of a generated file says: of which arm and set it is, and what its rounded constants stand
 //! for.
 
-use super::language::Exact;
-use super::{Checked, wrong};
-use crate::exact::angle::Angle;
-use crate::exact::rational::{self, Rational, integer, parse_rational, to_f64};
-use crate::exact::symbols::AngleSymbols;
-use crate::parameters::SetKind;
+use crate::angles::constant_angles;
+use crate::language::Exact;
+use crate::{Checked, wrong};
+use dyngen_arm::Arm;
+use dyngen_arm::exact::angle::Angle;
+use dyngen_arm::exact::rational::{self, Rational, integer, parse_rational, to_f64};
+use dyngen_arm::exact::symbols::AngleSymbols;
 use num_traits::{Signed, Zero};
 
 /// The head of a file.
 #[derive(Debug)]
-pub(super) struct Head {
+pub(crate) struct Head {
     /// The hash of the arm's description.
-    pub(super) arm: String,
-    pub(super) set: SetKind,
+    pub(crate) arm: String,
+    /// The name of the parameter set.
+    pub(crate) set: String,
 }
 
 /// What comments begin with in the languages of generated files.
@@ -29,16 +31,15 @@ fn comments(text: &str) -> impl Iterator<Item = (usize, &str)> {
 }
 
 impl Head {
-    pub(super) fn read(text: &str) -> Checked<Head> {
+    pub(crate) fn read(text: &str) -> Checked<Head> {
         let found = comments(text).find_map(|(line, text)| Some((line, text.strip_prefix("Arm: ")?)));
         let Some((line, rest)) = found else {
             return wrong(1, "no line '// Arm: …' at the head: dyngen did not write this file");
         };
         let (arm, rest) = rest.split_once(' ').unwrap_or((rest, ""));
-        let set =
-            rest.split_once("Parameter set: ").and_then(|(_, set)| SetKind::parse(set.trim_end_matches('.')));
-        match set {
-            Some(set) => Ok(Head { arm: arm.to_string(), set }),
+        let set = rest.split_once("Parameter set: ").map(|(_, set)| set.trim_end_matches('.'));
+        match set.filter(|set| ["full", "minimal", "symbolic", "published"].contains(set)) {
+            Some(set) => Ok(Head { arm: arm.to_string(), set: set.to_string() }),
             None => wrong(line, "no parameter set is named here"),
         }
     }
@@ -46,7 +47,7 @@ impl Head {
 
 /// What the constants of a file stand for where that is not what their digits say.
 #[derive(Debug, Default)]
-pub(super) struct Literals(Vec<Meaning>);
+pub(crate) struct Literals(Vec<Meaning>);
 
 #[derive(Debug)]
 struct Meaning {
@@ -58,7 +59,8 @@ struct Meaning {
 
 impl Literals {
     /// The lines `Rounded: LITERAL is EXACT` of the head, each of which must be true.
-    pub(super) fn read(text: &str, symbols: &AngleSymbols) -> Checked<Literals> {
+    pub(crate) fn read(text: &str, arm: &Arm) -> Checked<Literals> {
+        let symbols = &constant_angles(arm);
         let rounded = comments(text).filter_map(|(line, text)| Some((line, text.strip_prefix("Rounded: ")?)));
         let meaning = |(line, text): (usize, &str)| {
             let parts = text.split_once(" is ").and_then(|(l, rest)| Some((l.parse::<f64>().ok()?, rest)));
@@ -79,7 +81,7 @@ impl Literals {
 
     /// What a literal stands for at `place`, a function and a name in it; what its digits say where the head
     /// says nothing.
-    pub(super) fn exact(&self, digits: &str, place: &str) -> Option<Exact> {
+    pub(crate) fn exact(&self, digits: &str, place: &str) -> Option<Exact> {
         let value: f64 = digits.parse().ok()?;
         let of = || self.0.iter().filter(|m| m.literal == value);
         let here = of().find(|m| m.place.as_deref() == Some(place)).or(of().find(|m| m.place.is_none()));
@@ -91,7 +93,7 @@ impl Literals {
 
     /// Whether a literal has more digits than a number that was not rounded, and the head does not explain
     /// it.
-    pub(super) fn is_unexplained(&self, digits: &str) -> bool {
+    pub(crate) fn is_unexplained(&self, digits: &str) -> bool {
         let plain = digits.trim_matches('0').bytes().filter(u8::is_ascii_digit).count();
         plain > 15 && digits.parse().is_ok_and(|value: f64| !self.0.iter().any(|m| m.literal == value))
     }
@@ -100,9 +102,11 @@ impl Literals {
 /// The number that a text stands for, where `literal` is that number rounded.
 fn exact_of(text: &str, literal: f64, symbols: &AngleSymbols) -> Option<Exact> {
     let rounded = rational::from_f64(literal)?;
-    let near = |value: &Rational, ulps: i64| {
+    // Some units of the last place, and what rounding an angle of some size changes its sine by.
+    let near = |value: &Rational, ulps: i64, angle: Rational| {
         let ulp = rational::from_f64(literal.next_up())? - &rounded;
-        ((value - &rounded).abs() <= ulp * integer(ulps)).then_some(())
+        let change = angle * rational::from_f64(f64::EPSILON / 2.0)?;
+        ((value - &rounded).abs() <= ulp * integer(ulps) + change).then_some(())
     };
     if text == "this f64" {
         return Some(Exact::Number(rounded, Rational::zero()));
@@ -115,7 +119,7 @@ fn exact_of(text: &str, literal: f64, symbols: &AngleSymbols) -> Option<Exact> {
             "cos" => cosine,
             _ => return None,
         };
-        near(&value, 1)?;
+        near(&value, 1, radians(&symbols.angles[index]).abs())?;
         return Some(Exact::Symbol(index, function == "sin"));
     }
     if let Some(angle) = text.strip_prefix("the angle ") {
@@ -127,7 +131,7 @@ fn exact_of(text: &str, literal: f64, symbols: &AngleSymbols) -> Option<Exact> {
             },
         };
         // Sums of rounded angles are rounded again.
-        near(&(&number + &turns * pi()), 4)?;
+        near(&(&number + &turns * pi()), 4, Rational::zero())?;
         return Some(Exact::Number(number, turns));
     }
     let (numerator, denominator) = text.split_once('/').unwrap_or((text, "1"));
@@ -144,12 +148,16 @@ fn pi() -> Rational {
     parse_rational("3.14159265358979323846264338327950288419716939937511").unwrap_or_default()
 }
 
-/// Far more exact than a double, by the power series.
-fn sine_and_cosine(angle: &Angle) -> (Rational, Rational) {
-    let x = match angle {
+fn radians(angle: &Angle) -> Rational {
+    match angle {
         Angle::PiMultiple(turns) => turns * pi(),
         Angle::Radians(x) => x.clone(),
-    };
+    }
+}
+
+/// Far more exact than a double, by the power series.
+fn sine_and_cosine(angle: &Angle) -> (Rational, Rational) {
+    let x = radians(angle);
     let (mut term, mut sums) = (integer(1), [Rational::zero(), Rational::zero()]);
     let mut k = 0;
     while k < 20 || to_f64(&term).abs() > 1e-30 {
@@ -174,6 +182,15 @@ mod tests {
             assert!((to_f64(&s) - angle.sin_cos().0).abs() < 2e-16, "{text}");
             assert!((to_f64(&c) - angle.sin_cos().1).abs() < 2e-16, "{text}");
         }
+    }
+
+    #[test]
+    fn the_sine_of_a_rounded_angle_is_that_angles() {
+        // The double of 1.1 is 1.1 + 8.9e-17: its cosine is more than a unit from that of 1.1.
+        let symbols = AngleSymbols { angles: vec![Angle::parse("1.1").unwrap()] };
+        let cosine = 1.1f64.cos();
+        assert!(exact_of("cos(1.1)", cosine, &symbols).is_some());
+        assert!(exact_of("cos(1.1)", cosine.next_down().next_down(), &symbols).is_none());
     }
 
     #[test]

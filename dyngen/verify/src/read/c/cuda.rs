@@ -1,9 +1,9 @@
 //! What a file in CUDA has more than one in C: sizes and types in place of a header, and kernels.
 
+use super::super::kernel::Kernel;
 use super::{OTHER, Reader, TRIGONOMETRY};
-use crate::dynamics::Function;
-use crate::verify::kernel::Kernel;
-use crate::verify::{Checked, wrong};
+use crate::{Checked, wrong};
+use dyngen_arm::Function;
 
 /// What stands before the type of the numbers.
 const BEFORE: &str = r#"
@@ -34,7 +34,7 @@ typedef name_real real;
 ";
 
 impl Reader<'_> {
-    pub(super) fn before_cuda(&mut self) -> Checked<()> {
+    pub(crate) fn before_cuda(&mut self) -> Checked<()> {
         self.text.text(BEFORE, OTHER)?;
         let line = self.text.line();
         let upper = self.text.peek().and_then(|line| line.strip_prefix("#ifdef ")?.strip_suffix("_FLOAT"));
@@ -53,7 +53,7 @@ impl Reader<'_> {
 
     /// The words before the name of an item as they are in C; none where it is one that C has not, which is
     /// read.
-    pub(super) fn of_cuda(&mut self, line: usize, kind: &str, name: &str) -> Checked<Option<String>> {
+    pub(crate) fn of_cuda(&mut self, line: usize, kind: &str, name: &str) -> Checked<Option<String>> {
         if self.text.peek().is_some_and(|token| token.starts_with('#')) && kind.is_empty() && name.is_empty()
         {
             return self.size(line).map(|()| None);
@@ -83,8 +83,7 @@ impl Reader<'_> {
         };
         let name = name.strip_prefix(&upper).and_then(|name| name.strip_prefix('_')).unwrap_or_default();
         match name {
-            "JOINTS" | "PARAMETERS" | "ANGLES" => {}
-            "FRICTION_TERMS" => self.source.not_checked.push(name.to_string()),
+            "JOINTS" | "PARAMETERS" | "ANGLES" | "FRICTION_TERMS" => {}
             _ => return wrong(line, "a macro that dyngen does not write"),
         }
         match self.source.constants.insert(name.to_string(), (line, vec![number.to_string()])) {
