@@ -9,7 +9,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The crates whose order the page gives; cargo holds the order among them.
-const CRATES: [&str; 8] = [
+const CRATES: [&str; 10] = [
+    "dyngen/arm",
+    "dyngen/verify",
     "dyngen",
     "powerball/controller",
     "powerball/bus",

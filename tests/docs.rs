@@ -73,7 +73,9 @@ fn the_architecture_names_every_folder_of_the_sources() {
     let text = std::fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
     let crates = ["controller", "bus", "logs", "identification", "explanation", "virtual-arm", "commands"];
     let crates = crates.map(|name| format!("powerball/{name}/src"));
-    for krate in crates.iter().map(String::as_str).chain(["dyngen/src"]) {
+    for krate in
+        crates.iter().map(String::as_str).chain(["dyngen/arm/src", "dyngen/verify/src", "dyngen/src"])
+    {
         for entry in std::fs::read_dir(root().join(krate)).unwrap() {
             let entry = entry.unwrap();
             if entry.file_type().unwrap().is_dir() {
@@ -149,7 +151,14 @@ fn doc_comments_are_in_plain_words() {
     for krate in ["controller", "bus", "logs", "identification", "explanation", "virtual-arm", "commands"] {
         sources(&format!("powerball/{krate}/src"), &mut files);
     }
-    for folder in ["powerball/src", "dyngen/src", "dyngen-macros/src", "xtask/src", "ros2_control/src"] {
+    for folder in [
+        "powerball/src",
+        "dyngen/arm/src",
+        "dyngen/src",
+        "dyngen-macros/src",
+        "xtask/src",
+        "ros2_control/src",
+    ] {
         sources(folder, &mut files);
     }
     let pairs = PLAIN.split("; ").chain(PLAIN_IN_SOURCES.split("; "));

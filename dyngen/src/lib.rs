@@ -54,21 +54,15 @@
 //! "The paper" is *Modeling and dynamic parameter identification of the SCHUNK Powerball robotic arm*;
 //! equations and tables that are cited by number are its own.
 
-pub mod arm;
 pub mod base;
 mod config;
 pub mod consistency;
 pub mod describe;
-pub mod diagnostic;
 pub mod dynamics;
 pub mod emit;
 mod evaluator;
-#[doc(hidden)]
-pub mod exact;
 #[cfg(feature = "urdf")]
 pub mod export;
-#[doc(hidden)]
-pub mod file;
 #[doc(hidden)]
 pub mod graph;
 #[cfg(feature = "urdf")]
@@ -83,12 +77,12 @@ pub mod parameters;
 pub mod prove;
 pub mod rounding;
 mod values;
-pub mod verify;
 
-pub use arm::Arm;
-pub use config::{Config, GenerateError, Language};
-pub use diagnostic::{Diagnostic, Diagnostics};
-pub use dynamics::Function;
+pub use config::{Config, GenerateError};
+pub use dyngen_arm::{Arm, Diagnostic, Diagnostics, Function, Language, arm, diagnostic};
+#[doc(hidden)]
+pub use dyngen_arm::{exact, file};
+pub use dyngen_verify as verify;
 pub use emit::FrictionTerm;
 pub use evaluator::{Evaluator, Samples};
 pub use model::{Error, Model};

@@ -3,8 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use dyngen::import::{self, Options};
-use dyngen::verify::Verifier;
-use dyngen::{Arm, Config, Function, Language, Model, SetKind, Values};
+use dyngen::{Arm, Function, Model, SetKind, Values};
 use powerball::bus::canopen::Frame;
 use powerball::bus::transport::msgpack;
 use std::collections::BTreeSet;
@@ -14,7 +13,7 @@ use std::process::{Command, Output};
 /// Whether a gap is still one; else what happened.
 type Check = fn() -> Result<(), String>;
 
-const CHECKS: [(&str, Check); 9] = [
+const CHECKS: [(&str, Check); 8] = [
     ("floating-base", || refused_import(&urdf("floating", ""), "floating")),
     ("loops", loops),
     ("one-chain", || refused_import(&urdf("revolute", FORK), "tree")),
@@ -27,7 +26,6 @@ const CHECKS: [(&str, Check); 9] = [
     }),
     ("ball-joints", ball_joints),
     ("rounding-of-divisions", rounding_of_divisions),
-    ("verify-batches", verify_batches),
     ("can-fd", can_fd),
     ("six-joints-on-the-bus", six_joints),
 ];
@@ -156,17 +154,6 @@ fn rounding_of_divisions() -> Result<(), String> {
         (true, false) => Ok(()),
         (true, true) => Err("Λ has a bound in f32".to_string()),
         (false, _) => Err("Λ has no bound in f64".to_string()),
-    }
-}
-
-fn verify_batches() -> Result<(), String> {
-    let code = Config::new(file("two.toml", &arm_text())).batch(true).source().map_err(|e| e.to_string())?;
-    let report = Verifier::new(arm(), Language::Rust, &code)
-        .and_then(|verifier| verifier.verify(&code, None))
-        .map_err(|e| e.to_string())?;
-    match report.not_checked.iter().any(|item| item.contains("batch")) {
-        true => Ok(()),
-        false => Err(format!("all is checked: {report:?}")),
     }
 }
 

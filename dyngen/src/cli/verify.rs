@@ -3,7 +3,7 @@
 use super::{Failure, Progress, arm, print};
 use dyngen::emit::{self, Options};
 use dyngen::verify::{Difference, Error, Report, Verifier};
-use dyngen::{Function, Language, Values};
+use dyngen::{Arm, Function, Language, Model, SetKind, Values};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -34,13 +34,13 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     let arm = arm(&args.arm)?;
     let progress = Progress::new(&arm);
     progress.say("deriving, reading and proving");
-    let verifier = Verifier::new(arm, Language::of(&args.file), &text).map_err(failure)?;
+    let verifier = Verifier::new(arm.clone(), Language::of(&args.file), &text).map_err(failure)?;
     if let Some(path) = &args.values {
-        check_values(&verifier, path)?;
+        check_values(&verifier, arm.clone(), path)?;
     }
     let mut report = verifier.verify(&text, None).map_err(failure)?;
     if let Some(difference) = &mut report.difference
-        && let Some(line) = written_otherwise(&verifier, &text, &difference.function)
+        && let Some(line) = written_otherwise(&verifier, arm, &text, &difference.function)
     {
         difference.line = line;
     }
@@ -55,15 +55,15 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
 
 /// The first line of a function that is not what dyngen writes, in Rust: no part of the proof, but where to
 /// look.
-fn written_otherwise(verifier: &Verifier, text: &str, function: &str) -> Option<usize> {
+fn written_otherwise(verifier: &Verifier, arm: Arm, text: &str, function: &str) -> Option<usize> {
     let has = |f: &Function| text.contains(&format!("pub fn {f}_with<"));
     let options = Options {
-        parameters: verifier.set(),
+        parameters: SetKind::parse(verifier.set())?,
         functions: Function::ALL.into_iter().filter(has).collect(),
         values: verifier.values().map(<[f64]>::to_vec),
         ..Options::default()
     };
-    let fresh = emit::source(verifier.model(), &options).ok()?;
+    let fresh = emit::source(&Model::derive(arm).ok()?, &options).ok()?;
     let (module, name) = function.rsplit_once("::").unwrap_or(("", function));
     let (module, name) = (format!("pub mod {module} {{"), name.strip_suffix("_with").unwrap_or(name));
     let inside = if module == "pub mod  {" { "" } else { &module };
@@ -88,9 +88,11 @@ fn lines<'t>(text: &'t str, inside: &str, head: &str) -> Option<Vec<(usize, &'t 
 }
 
 /// Whether the file's values are those of the JSON file.
-fn check_values(verifier: &Verifier, path: &Path) -> Result<(), Failure> {
-    let set = verifier.model().set(verifier.set()).map_err(Failure::refused)?;
-    let values = Values::read(path).and_then(|v| v.of_set(verifier.model(), set)).map_err(Failure::input)?;
+fn check_values(verifier: &Verifier, arm: Arm, path: &Path) -> Result<(), Failure> {
+    let model = Model::derive(arm).map_err(Failure::refused)?;
+    let kind = SetKind::parse(verifier.set()).unwrap_or(SetKind::Minimal);
+    let set = model.set(kind).map_err(Failure::refused)?;
+    let values = Values::read(path).and_then(|v| v.of_set(&model, set)).map_err(Failure::input)?;
     match verifier.values() {
         None => Err(Failure::refused(format!("{}: no values are baked into the file", path.display()))),
         Some(found) => match found.iter().zip(&values).position(|(a, b)| a != b) {

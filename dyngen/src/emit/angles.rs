@@ -272,7 +272,7 @@ pub(super) fn trigonometry(arm: &Arm) -> TokenStream {
         return quote!();
     }
     // The module that this crate compiles too: it parses.
-    let file = syn::parse_file(include_str!("trigonometry.rs"));
+    let file = syn::parse_file(dyngen_verify::text::TRIGONOMETRY);
     let (docs, items) = file.map_or((Vec::new(), Vec::new()), |file| (file.attrs, file.items));
     quote! {
         mod trigonometry {

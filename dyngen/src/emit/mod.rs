@@ -1,13 +1,11 @@
 //! From graphs to source files: statements, docs, and their print in Rust, C, CUDA and WGSL.
 
-#[cfg(test)]
-mod accuracy;
 mod angles;
 mod batch;
 mod c;
 pub mod c_api;
 mod code;
-pub(crate) mod discrete;
+mod discrete;
 mod docs;
 mod friction;
 mod fused;
@@ -19,6 +17,7 @@ mod statement;
 mod syntax;
 mod tests;
 #[cfg(test)]
+#[path = "../../verify/src/text/trigonometry.rs"]
 mod trigonometry;
 mod wgsl;
 

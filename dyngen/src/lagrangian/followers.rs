@@ -2,10 +2,10 @@
 
 use crate::arm::{Angle, Arm, JointKind};
 use crate::exact::algebra::Algebra;
-use crate::exact::rational::{self, Rational, to_f64};
+use crate::exact::angle::circle_point_near;
+use crate::exact::rational::{self, Rational};
 use dashu_int::IBig;
-use num_traits::{FromPrimitive, One, Signed, Zero};
-use std::f64::consts::TAU;
+use num_traits::{One, Signed};
 
 /// Sine and cosine of the trigonometric input of every joint, where each group of joints that move together
 /// is at a point of the circle that `draw` gives.
@@ -86,28 +86,6 @@ fn sum_of_angles<A: Algebra>(
     (alg.add(&alg.mul(s, d), &alg.mul(c, t)), alg.sub(&alg.mul(c, d), &alg.mul(s, t)))
 }
 
-/// A rational point of the circle within 1e-12 rad of an angle: from the tangent of its half by its continued
-/// fraction.
-fn circle_point_near(angle: f64) -> (Rational, Rational) {
-    let tangent = (angle.rem_euclid(TAU) / 2.0).tan();
-    let mut rest = tangent;
-    let (mut before, mut t) = ([IBig::zero(), IBig::one()], [IBig::one(), IBig::zero()]);
-    for _ in 0..40 {
-        let whole = rest.floor();
-        let Some(count) = IBig::from_f64(whole) else { break };
-        let next = [&count * &t[0] + &before[0], &count * &t[1] + &before[1]];
-        (before, t) = (t, next);
-        let value = to_f64(&rational::ratio(t[0].clone(), t[1].clone()));
-        if (value - tangent).abs() < 4e-13 * (1.0 + tangent * tangent) || rest == whole {
-            break;
-        }
-        rest = 1.0 / (rest - whole);
-    }
-    let [p, q] = t;
-    let (square, scale) = (&q * &q - &p * &p, &q * &q + &p * &p);
-    (rational::ratio(&p * &q * 2, scale.clone()), rational::ratio(square, scale))
-}
-
 /// Sine and cosine of a multiple of an angle, by doubling.
 fn multiple_of<A: Algebra>(alg: &A, count: &IBig, angle: &(A::Value, A::Value)) -> (A::Value, A::Value) {
     let mut total = (alg.integer(0), alg.integer(1));
@@ -129,19 +107,6 @@ fn multiple_of<A: Algebra>(alg: &A, count: &IBig, angle: &(A::Value, A::Value)) 
 mod tests {
     use super::*;
     use crate::exact::prime::{Draws, Fp, PrimeField};
-
-    #[test]
-    fn a_point_of_the_circle_is_near_its_angle() {
-        for k in -50..50 {
-            let angle = 0.137 * f64::from(k);
-            let (s, c) = circle_point_near(angle);
-            assert_eq!(&s * &s + &c * &c, Rational::one());
-            assert!(
-                (to_f64(&s) - angle.sin()).abs() < 2e-12 && (to_f64(&c) - angle.cos()).abs() < 2e-12,
-                "{angle}"
-            );
-        }
-    }
 
     #[test]
     fn multiples_of_an_angle_are_sums_of_it() {

@@ -132,11 +132,6 @@ impl<'a> Point<'a> {
         self.arm.dof()
     }
 
-    /// Sine and cosine of a joint's trigonometric input.
-    pub(crate) fn input_angle(&self, joint: usize) -> (Fp, Fp) {
-        self.angles[joint]
-    }
-
     /// Sine and cosine of q + theta.
     pub(super) fn joint_trig(&self, joint: usize) -> (Fp, Fp) {
         with_theta(&PrimeField, &self.arm.joints[joint].theta, self.angles[joint])

@@ -236,7 +236,7 @@ fn documentation(text: &str) -> String {
 /// What functions of the source file call.
 fn helpers(names: &Names, model: &Model, options: &Options) -> String {
     let turns = model.arm().joints.iter().any(|joint| joint.kind == JointKind::Revolute);
-    let trigonometry = if turns { include_str!("trigonometry.c") } else { "" };
+    let trigonometry = if turns { dyngen_verify::text::TRIGONOMETRY_C } else { "" };
     let friction = friction::helpers(&options.friction);
     let parts = [trigonometry, &friction]
         .map(|text| if text.is_empty() { String::new() } else { format!("{text}\n") });

@@ -31,7 +31,7 @@ pub fn wgsl_source(model: &Model, options: &Options) -> Result<String, Error> {
     let names = Names::new(&model.arm().name);
     let mut items = vec![constants(&names, model, &parts, options), entry::bindings(&names, &parts)];
     if model.arm().joints.iter().any(|joint| joint.kind == JointKind::Revolute) {
-        items.push(include_str!("trigonometry.wgsl").to_string());
+        items.push(dyngen_verify::text::TRIGONOMETRY_WGSL.to_string());
     }
     items.push(trig(&names, model));
     if parts.takes_parameters() {
