@@ -128,20 +128,6 @@ fn ball_joints() -> Result<(), String> {
     }
 }
 
-/// A turning joint and one that carries a body.
-fn arm() -> Arm {
-    Arm::parse(&arm_text(), "two.toml").unwrap_or_else(|e| panic!("{e}"))
-}
-
-fn arm_text() -> String {
-    let joint = "{ kind = \"revolute\", a = 0.3, alpha = \"pi/2\", d = 0.1, theta = 0, position = [-1, 1], \
-                 velocity = 1, acceleration = 1, torque = 1 }";
-    format!(
-        "name = \"two\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\njoint = [\n{joint},\n{joint},\n\
-        ]\n"
-    )
-}
-
 fn rounding_of_divisions() -> Result<(), String> {
     let arm = Arm::parse(include_str!("../lwa4p.toml"), "lwa4p.toml").unwrap_or_else(|e| panic!("{e}"));
     let model = Model::derive(arm).unwrap();
