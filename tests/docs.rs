@@ -154,6 +154,7 @@ fn doc_comments_are_in_plain_words() {
     for folder in [
         "powerball/src",
         "dyngen/arm/src",
+        "dyngen/verify/src",
         "dyngen/src",
         "dyngen-macros/src",
         "xtask/src",

@@ -106,6 +106,13 @@ impl Values {
         Err(Diagnostics(wrong.into_iter().map(diagnostic).collect()))
     }
 
+    /// Values with 0 for the names for which `is` holds.
+    #[must_use]
+    pub fn with_zero(&self, is: impl Fn(&str) -> bool) -> Values {
+        let by_name = self.by_name.iter().map(|(name, x)| (name.clone(), if is(name) { 0.0 } else { *x }));
+        Values { file: self.file.clone(), by_name: by_name.collect() }
+    }
+
     /// The names that have values.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.by_name.keys().map(String::as_str)

@@ -133,14 +133,17 @@ fn rounding_of_divisions() -> Result<(), String> {
     let model = Model::derive(arm).unwrap();
     let values = Values::parse(include_str!("../../examples/cpp-controller/model.json"), "model.json");
     let values = values.unwrap().of_set(&model, model.set(SetKind::Minimal).unwrap()).unwrap();
-    let built = model.function(Function::TaskInertia, SetKind::Minimal).unwrap();
-    let bounds = dyngen::rounding::bounds(&model, &built, Some(&values));
-    let bounds = bounds.map_err(|why| format!("Λ has no bound: {why}"))?;
-    match (bounds.double[0].is_finite(), bounds.single[0].is_finite()) {
-        (true, false) => Ok(()),
-        (true, true) => Err("Λ has a bound in f32".to_string()),
-        (false, _) => Err("Λ has no bound in f64".to_string()),
+    for function in [Function::TaskInertia, Function::ConsistentInverse] {
+        let built = model.function(function, SetKind::Minimal).unwrap();
+        let bounds = dyngen::rounding::bounds(&model, &built, Some(&values));
+        let bounds = bounds.map_err(|why| format!("{} has no bound: {why}", function.name()))?;
+        match (bounds.double[0].is_finite(), bounds.single[0].is_finite()) {
+            (true, false) => {}
+            (true, true) => return Err(format!("{} has a bound in f32", function.name())),
+            (false, _) => return Err(format!("{} has no bound in f64", function.name())),
+        }
     }
+    Ok(())
 }
 
 fn can_fd() -> Result<(), String> {

@@ -112,11 +112,11 @@ pub(crate) fn named_values(file: Option<PathBuf>, named: &BTreeMap<String, f64>)
 
 #[pymethods]
 impl Arm {
-    /// An arm from the text of an arm file.
+    /// An arm from the text of an arm file: its name in errors, and where it is.
     #[staticmethod]
-    fn parse(text: String, file: &str) -> PyResult<Arm> {
+    fn parse(text: String, file: &str, place: Option<PathBuf>) -> PyResult<Arm> {
         let arm = Arm::new(dyngen::Arm::parse(&text, file).map_err(input)?, text);
-        Ok(Arm { file: Some(file.into()), ..arm })
+        Ok(Arm { file: place, ..arm })
     }
 
     /// An arm from the text of a URDF or of a MuJoCo model.

@@ -5,7 +5,7 @@ use crate::failure::{input, refused};
 use crate::identify::{ModelText, Written, model_file};
 use crate::logs::{Given, column_map, taken};
 use crate::motion::Trajectory;
-use crate::servos::{Masses, Servos};
+use crate::servos::{Masses, Servos, with_torques};
 use crate::work;
 use powerball::ExplainOptions;
 use powerball::explanation::{ExplainError, Prepared, Rule};
@@ -81,7 +81,7 @@ pub(crate) fn explain(
         let servos = Servos::new(arm, values, model.is_some(), (logs, validate))?;
         return servos.explain(py, rule, progress.as_ref()).map(Explanation::Servos);
     }
-    let arm = arm.arm.clone();
+    let arm = with_torques(arm, &values)?.clone();
     let name = model.as_ref().map(|(_, name)| name.clone());
     let known = model.as_ref().map(model_file).transpose()?.map(|file| file.model);
     let done = work::run(py, progress.as_ref(), move |progress| -> Result<_, Why> {

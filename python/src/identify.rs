@@ -3,7 +3,7 @@
 use crate::arm::Arm;
 use crate::failure::{input, refused, value};
 use crate::logs::{Given, column_map, taken};
-use crate::servos::{Masses, Servos};
+use crate::servos::{Masses, Servos, with_torques};
 use crate::work;
 use powerball::comparison::{CompareError, CompareOptions};
 use powerball::explanation::torque_model::{Additions, ModelFile};
@@ -99,7 +99,7 @@ pub(crate) fn identify(
         let servos = Servos::new(arm, values, model.is_some(), (logs, validate))?;
         return servos.identify(py, progress.as_ref()).map(Fit::Servos);
     }
-    let arm = arm.arm.clone();
+    let arm = with_torques(arm, &values)?.clone();
     let known = model.as_ref().map(model_file).transpose()?;
     let (identified, known) = work::run(py, progress.as_ref(), move |progress| {
         let options = IdentifyOptions {

@@ -19,6 +19,17 @@ use std::path::PathBuf;
 /// Values of an arm's inertial parameters as Python gives them: a file, or by name.
 pub(crate) type Masses = Option<(Option<PathBuf>, BTreeMap<String, f64>)>;
 
+/// The arm of logs with torques, which need no masses.
+pub(crate) fn with_torques<'a>(arm: &'a Arm, masses: &Masses) -> PyResult<&'a dyngen::Arm> {
+    match masses {
+        Some(_) => Err(input(
+            "values takes logs of position servos (goal1 … and no torque); these have torques, from which \
+             masses are identified",
+        )),
+        None => Ok(&arm.arm),
+    }
+}
+
 /// Logs of position servos with what is known of their arm, not yet read.
 pub(crate) struct Servos {
     arm: dyngen::Arm,

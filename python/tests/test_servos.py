@@ -149,6 +149,23 @@ def test_frames_dicts_and_arrays_are_the_same_log(servo, arm, identified):
     assert mapped.fit.position_error == pytest.approx(identified.fit.position_error, rel=1e-3)
 
 
+def test_masses_are_next_to_the_arm_file_wherever_the_program_works(servo, tmp_path, monkeypatch):
+    monkeypatch.chdir(servo)
+    arm = pb.Arm.from_toml("arm.toml")
+    monkeypatch.chdir(tmp_path)
+    assert pb.identify(arm, servo / "steps.csv").servo[0].absolute
+    assert not pb.identify(pb.Arm.from_toml(ARM), servo / "steps.csv").servo[0].absolute
+
+
+def test_samples_after_the_drive_was_switched_off_are_those_of_a_column(servo, arm):
+    one = read(servo / "steps.csv")
+    on = (T < 4.0).astype(float)
+    column = pb.identify(arm, {**one, "torque_enable1": on}).to_dict()
+    given = pb.Log(one["t"], one["q1"][:, None], goal=one["goal1"][:, None], torque_enable=on[:, None])
+    again = pb.identify(arm, given).to_dict()
+    assert again["servo"] == column["servo"] != pb.identify(arm, one).to_dict()["servo"]
+
+
 def test_explain_is_the_commands_and_names_a_load(servo, arm, tmp_path):
     validate = [servo / "others.csv", servo / "loaded.csv"]
     explained = pb.explain(arm, [servo / "steps.csv", servo / "chirp.csv"], validate)
@@ -179,9 +196,15 @@ def test_what_servos_do_not_take(servo, arm, identified):
         pb.identify(arm, log, log)
     with pytest.raises(pb.InputError, match="--mounting is of logs with torques"):
         pb.identify(arm, pb.Mounted(log, "90,0"))
+    with pytest.raises(pb.InputError, match="give at least one validation log"):
+        pb.explain(arm, log, [])
+    with pytest.raises(pb.InputError, match="values takes logs of position servos"):
+        pb.identify(arm, torques, values=point(0.5))
     with pytest.raises(ValueError, match="values must be given by name"):
         pb.identify(arm, log, values=[1.0])
     with pytest.raises(ValueError, match="fits of torques are compared"):
         pb.compare(log, log, arm=arm)
+    with pytest.raises(ValueError, match="a is of position servos"):
+        pb.compare(identified, identified)
     with pytest.raises(pb.InputError, match="has no torque model"):
         pb.verify(arm, identified, torques)

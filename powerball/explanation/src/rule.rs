@@ -23,7 +23,7 @@ pub struct Rule {
     pub per_coefficient: f64,
     /// Probability of accepting anything at all where nothing is missing, over all joints and candidates;
     /// above the band that of a ripple, over all joints and orders; that of a wrong decision between two
-    /// names by an experiment; that of calling an effect missing in one of eight octaves of speed. A
+    /// names by an experiment; that of calling an effect missing in one of eight octaves of time. A
     /// candidate must exceed all but this share of its time-shift surrogates.
     pub family_wise: f64,
 
@@ -38,14 +38,14 @@ pub struct Rule {
     /// are, of each joint's travel; the share of accepted surrogates, above which a reader is warned.
     pub negligible: f64,
     /// What is below this share is little, and a change by more is clear. A joint is predicted where no more
-    /// of its torque's rms is left, and next to nothing is where all but this share is left. What lowers the
-    /// rms of its joints by more needs no folds where it does so on the validation set and the other way
-    /// round, and position servos need no significance for it, as few seconds are too few blocks. A name is
-    /// taken back where without its effect the held-out squared error of all joints is smaller by more; what
-    /// is in validation logs only must not raise that of a joint by more; on repeats of one path, where
-    /// whoever has more parameters fits the error that is the same in all of them, the per-joint fit must
-    /// lower it by more. Two paths, two parts of a residual, or the models of two names are the same but for
-    /// this share. A force in all but this share of a log's rests is that of a carried body.
+    /// of its torque's rms is left; where all but this share is left, a model predicts almost nothing. What
+    /// lowers the rms of its joints by more needs no folds where it does so on the validation set and the
+    /// other way round, and position servos need no significance for it, as few seconds are too few blocks.
+    /// A name is taken back where without its effect the held-out squared error of all joints is smaller by
+    /// more; what is in validation logs only must not raise that of a joint by more; on repeats of one path,
+    /// where whoever has more parameters fits the error that is the same in all of them, the per-joint fit
+    /// must lower it by more. Two paths, two parts of a residual, or the models of two names are the same
+    /// but for this share. A force in all but this share of a log's rests is that of a carried body.
     pub little: f64,
     /// What is more than this share is most of a thing: half. An event of some seconds (a push) must explain
     /// most of what its time has more of squared error than others; another log has the same push where it
@@ -74,7 +74,8 @@ pub struct Rule {
     /// it falls onto others of its kind for at most a quarter of a log.
     pub event_surrogate_level: f64,
     /// Surrogates of a step, and those that state the false-positive rate. A tenth of it where a search is
-    /// done again for each: an effect's for logs and times, that for ripple above the band.
+    /// done again for each (an effect's for logs and times, that for ripple above the band): these must be
+    /// enough for [`family_wise`](Self::family_wise).
     pub surrogates: usize,
     /// A shifted column that still correlates so much with the unshifted one (a periodic motion) is no
     /// surrogate.
@@ -171,6 +172,13 @@ impl Rule {
                 rule.shortest_block, rule.longest_block
             )));
         }
+        let least = 10.0 * (1.0 / rule.family_wise - 1.0).ceil();
+        if (rule.surrogates as f64) < least {
+            return Err(RuleError(format!(
+                "surrogates is {}: a family_wise of {} needs {least} or more",
+                rule.surrogates, rule.family_wise
+            )));
+        }
         Ok(rule)
     }
 
@@ -245,6 +253,7 @@ mod tests {
             (r#"{"nearly_all": 1.5}"#, "nearly_all is 1.5: it is a share"),
             (r#"{"most_steps": 1.5}"#, "most_steps: invalid type"),
             (r#"{"least_score": NaN}"#, "expected value"),
+            (r#"{"surrogates": 500}"#, "surrogates is 500: a family_wise of 0.01 needs 990 or more"),
             (r#"{"shortest_block": 9}"#, "shortest_block (9 s) is longer than longest_block (2 s)"),
             ("7", "invalid type"),
         ] {

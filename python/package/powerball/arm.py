@@ -122,7 +122,9 @@ class Arm(Functions):
         Raises: ``InputError`` with every error of the file at once, each with line and column.
         """
         text, file = _text(source, "=", _read)
-        return _made("parse", (text, file))
+        # Its masses may be next to it, wherever the program works then.
+        place = os.path.abspath(file) if text is not source else None
+        return _made("parse", (text, file, place))
 
     @classmethod
     def from_urdf(

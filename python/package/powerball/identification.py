@@ -294,6 +294,8 @@ def compare(
 def _side(
     side: Any, name: str, arm: Optional[Arm], map: Optional[Map], progress: Progress
 ) -> _core.ComparedSide:
+    if isinstance(side, IdentifiedServos):
+        raise ValueError(f"{name} is of position servos: fits of torques are compared")
     if isinstance(side, Identified):
         own: _core.ComparedSide = side._core.side(name)
         return own
@@ -305,6 +307,4 @@ def _side(
     if arm is None:
         raise ValueError(f"{name} is no result of identify; for a log or a summary give its arm as arm=")
     found = identify(arm, side, map=map, progress=progress)
-    if isinstance(found, IdentifiedServos):
-        raise ValueError(f"{name} is of position servos: fits of torques are compared")
     return _side(found, name, None, None, False)

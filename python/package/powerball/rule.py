@@ -29,7 +29,7 @@ class Rule:
     per_coefficient: float = 2.0
     #: Probability of accepting anything at all where nothing is missing, over all joints and candidates;
     #: above the band that of a ripple, over all joints and orders; that of a wrong decision between two
-    #: names by an experiment; that of calling an effect missing in one of eight octaves of speed. A
+    #: names by an experiment; that of calling an effect missing in one of eight octaves of time. A
     #: candidate must exceed all but this share of its time-shift surrogates.
     family_wise: float = 0.01
     #: The held-out squared error must fall by this share on average over folds: 1 % of the rms, below which
@@ -43,14 +43,14 @@ class Rule:
     #: runs are, of each joint's travel; the share of accepted surrogates, above which a reader is warned.
     negligible: float = 0.05
     #: What is below this share is little, and a change by more is clear. A joint is predicted where no more
-    #: of its torque's rms is left, and next to nothing is where all but this share is left. What lowers the
-    #: rms of its joints by more needs no folds where it does so on the validation set and the other way
-    #: round, and position servos need no significance for it, as few seconds are too few blocks. A name is
-    #: taken back where without its effect the held-out squared error of all joints is smaller by more; what
-    #: is in validation logs only must not raise that of a joint by more; on repeats of one path, where
-    #: whoever has more parameters fits the error that is the same in all of them, the per-joint fit must
-    #: lower it by more. Two paths, two parts of a residual, or the models of two names are the same but for
-    #: this share. A force in all but this share of a log's rests is that of a carried body.
+    #: of its torque's rms is left; where all but this share is left, a model predicts almost nothing. What
+    #: lowers the rms of its joints by more needs no folds where it does so on the validation set and the
+    #: other way round, and position servos need no significance for it, as few seconds are too few blocks.
+    #: A name is taken back where without its effect the held-out squared error of all joints is smaller by
+    #: more; what is in validation logs only must not raise that of a joint by more; on repeats of one path,
+    #: where whoever has more parameters fits the error that is the same in all of them, the per-joint fit
+    #: must lower it by more. Two paths, two parts of a residual, or the models of two names are the same
+    #: but for this share. A force in all but this share of a log's rests is that of a carried body.
     little: float = 0.1
     #: What is more than this share is most of a thing: half. An event of some seconds (a push) must explain
     #: most of what its time has more of squared error than others; another log has the same push where it
@@ -77,7 +77,8 @@ class Rule:
     #: it falls onto others of its kind for at most a quarter of a log.
     event_surrogate_level: float = 0.75
     #: Surrogates of a step, and those that state the false-positive rate. A tenth of it where a search is
-    #: done again for each: an effect's for logs and times, that for ripple above the band.
+    #: done again for each (an effect's for logs and times, that for ripple above the band): these must be
+    #: enough for ``family_wise``.
     surrogates: int = 2000
     #: A shifted column that still correlates so much with the unshifted one (a periodic motion) is no
     #: surrogate.

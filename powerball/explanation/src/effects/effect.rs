@@ -188,7 +188,7 @@ pub trait Effect: Sync {
         None
     }
 
-    /// An effect without an assumption that its law makes; `None` where it makes none. By the
+    /// The candidate's effect without an assumption that its law makes; `None` where it makes none. By the
     /// difference of the two sizes the standard error is larger.
     fn otherwise(&self, _candidate: &Candidate) -> Option<Candidate> {
         None

@@ -10,6 +10,7 @@ use powerball_identification::estimate::distribution::t_critical;
 use powerball_identification::servo::constants::Constant;
 use powerball_identification::servo::fit::{Fitted, Free, errors, fit, objective, slopes};
 use powerball_identification::servo::{Joint, Problem, Role, standard_errors};
+use powerball_logs::vector::median;
 
 /// Masses that are tried first, in units of the mass whose weight is a tenth of the torque at full duty: a
 /// swing in phase with another mass is a minimum too.
@@ -148,9 +149,8 @@ pub(super) fn spread(sizes: &[[Option<Size>; 2]], odd: &[bool], change: Change) 
         .filter(|(_, odd)| !**odd)
         .filter_map(|(of, _)| Some((of[change as usize]?.value - change.none()).abs()))
         .collect();
-    values.sort_by(f64::total_cmp);
     // The median of |x| of a normal x is 0.6745 of its deviation.
-    values.get(values.len() / 2).map_or(0.0, |median| median / 0.6745)
+    median(&mut values) / 0.6745
 }
 
 /// The squared error of each log over the median one of the fitted logs, which are the first `fitted`; `None`
@@ -158,8 +158,7 @@ pub(super) fn spread(sizes: &[[Option<Size>; 2]], odd: &[bool], change: Change) 
 pub(super) fn error_ratios(sizes: &[[Option<Size>; 2]], fitted: usize) -> Vec<Option<f64>> {
     let error = |of: &[Option<Size>; 2]| of.iter().flatten().next().map(|size| size.before);
     let mut usual: Vec<f64> = sizes[..fitted].iter().filter_map(error).collect();
-    usual.sort_by(f64::total_cmp);
-    let usual = usual.get(usual.len() / 2).copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
+    let usual = median(&mut usual).max(f64::MIN_POSITIVE);
     sizes.iter().map(|of| Some(error(of)? / usual)).collect()
 }
 

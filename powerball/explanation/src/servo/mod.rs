@@ -28,7 +28,7 @@ use serde_json::json;
 /// Explains logs of position servos: what they lack on all logs, and what single logs have.
 ///
 /// # Errors
-/// Arms and logs that cannot be used: why.
+/// Arms and logs that cannot be used, and no validation log: why.
 pub fn explain_servos(
     arm: &ServoArm,
     logs: &[ServoLog],
@@ -36,6 +36,11 @@ pub fn explain_servos(
     rule: &Rule,
     progress: Progress<'_>,
 ) -> Result<ExplainedServos, IdentifyError> {
+    if validate.is_empty() {
+        return Err(IdentifyError::Setting(
+            "every addition is judged on logs that were not fitted: give at least one validation log".into(),
+        ));
+    }
     let mut result = ExplainedServos::of(arm, logs, validate);
     for j in 0..arm.body.dof() {
         progress.say(&format!("explaining joint {}", j + 1));

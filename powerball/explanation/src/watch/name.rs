@@ -244,7 +244,7 @@ impl<'a> Stretch<'a> {
     ) -> Named {
         let edges: Vec<f64> = std::iter::once(since).chain(until).collect();
         let (coefficients, explains) = self.fitted(&columns, &edges);
-        let penalty = self.rule.per_coefficient * columns.len() as f64 + 2.0 * searched.ln();
+        let penalty = self.rule.penalty(columns.len(), searched);
         Named {
             changes: changes(&coefficients),
             joints: Vec::new(),

@@ -42,6 +42,8 @@ impl<'f> FoldFits<'f> {
 
     /// Share by which the held-out squared error of some joints falls with a trial's columns, by fold; the
     /// model and the columns are fitted to the rest. `local` is as in [`Folds::folds`].
+    ///
+    /// The model is fitted once without each of `folds`, so every call must give the same ones.
     #[must_use]
     pub fn gains(
         &self,

@@ -55,16 +55,21 @@ pub fn log_change(other: &Rows<'_>, (trial, columns): (&Trial, &[Column])) -> f6
 }
 
 /// The mean square of a residual in one log over the variance that each joint has elsewhere, `sigma` squared,
-/// mean over the joints that have both.
+/// mean over the joints that have a variance and at least `rows` rows in the log; `None` where none has.
 #[must_use]
-pub fn error_in_log(data: &Data<'_>, residual: &[Vec<f64>], sigma: &[f64], log: usize) -> Option<f64> {
+pub fn error_in_log(
+    data: &Data<'_>,
+    residual: &[Vec<f64>],
+    sigma: &[f64],
+    (log, rows): (usize, usize),
+) -> Option<f64> {
     let of = |j: usize| {
-        let rows = data.recordings.iter().zip(&data.joints[j].rows).filter(|(r, _)| r.log == log);
-        let (square, count) = rows.fold((0.0, 0), |(square, count), (_, rows)| {
+        let own = data.recordings.iter().zip(&data.joints[j].rows).filter(|(r, _)| r.log == log);
+        let (square, count) = own.fold((0.0, 0), |(square, count), (_, rows)| {
             let own = &residual[j][rows.clone()];
             (square + dot(own, own), count + rows.len())
         });
-        (count > 0 && sigma[j] > 0.0).then(|| square / count as f64 / sigma[j].powi(2))
+        (count >= rows && sigma[j] > 0.0).then(|| square / count as f64 / sigma[j].powi(2))
     };
     let joints: Vec<f64> = (0..data.dof()).filter_map(of).collect();
     (!joints.is_empty()).then(|| joints.iter().sum::<f64>() / joints.len() as f64)

@@ -1,7 +1,7 @@
 //! Logs and summaries, taken in one after another: the sufficient statistics of each mounting of the base.
 //!
-//! The file also has arm and logs of one mounting, read at once; the samples of all logs of a computation, read at
-//! once.
+//! The file also has arm and logs of one mounting, read at once; the samples of all logs of a computation,
+//! read at once.
 
 use super::result::IdentifyError;
 use crate::conventions::{Conventions, conventions};

@@ -1,7 +1,7 @@
 //! What a model leaves of the validation set, each joint in the band in which it was fitted.
 //!
-//! The file also has what one set of parameters leaves of the logs of each mounting; whether friction that differs
-//! with the direction is what a poor fit lacks; logs prepared in the band of each joint.
+//! The file also has what one set of parameters leaves of the logs of each mounting; whether friction that
+//! differs with the direction is what a poor fit lacks; logs prepared in the band of each joint.
 
 use super::IdentifyOptions;
 use super::fit::{Along, Fitted, fit};

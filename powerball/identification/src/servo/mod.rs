@@ -30,7 +30,6 @@ use powerball_logs::log::ServoLog;
 use powerball_logs::regression::RigidArm;
 pub use problem::{Known, Problem, Role};
 pub use result::{Along, IdentifiedServos, JointServo, PositionStats, ServoFriction, no_torques};
-use std::borrow::Cow;
 pub use uncertainty::standard_errors;
 
 /// Delays of the goal that are tried for its error, s.
@@ -93,19 +92,11 @@ fn tool(arm: &Arm) -> [f64; 3] {
 
 /// Values of the bodies alone: an armature is rotor and gear together, whether the arm file gives it or the
 /// logs do.
-fn without_rotors<'v>(arm: &Arm, values: &'v Values) -> Cow<'v, Values> {
+fn without_rotors(arm: &Arm, values: &Values) -> Values {
     let all = arm.all_parameters();
     let rotors: Vec<String> =
         all.iter().filter(|p| p.kind == ParameterKind::Im).map(ToString::to_string).collect();
-    let is_rotor = |name: &str| rotors.iter().any(|rotor| rotor == name);
-    if !values.names().any(is_rotor) {
-        return Cow::Borrowed(values);
-    }
-    let bodies = values.names().map(|name| match is_rotor(name) {
-        true => (name, 0.0),
-        false => (name, values.get(name).unwrap_or(0.0)),
-    });
-    Cow::Owned(Values::named(bodies, "the masses"))
+    values.with_zero(|name| rotors.iter().any(|rotor| rotor == name))
 }
 
 /// All parameters of 1 kg where the arm's last frame or its tool is.

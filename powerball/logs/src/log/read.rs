@@ -1,7 +1,7 @@
 //! Logs found by their column names, from a file of any format.
 //!
-//! The file also has samples as they were read, before any doubt; the samples of a log while it is read, by whatever
-//! reader.
+//! The file also has samples as they were read, before any doubt; the samples of a log while it is read, by
+//! whatever reader.
 
 use super::columns::{Asked, Columns};
 use super::map::ColumnMap;

@@ -82,8 +82,8 @@ impl Link {
         } else {
             (w + axis * v, dw + axis * a + w.cross(&axis) * v, Vector3::zeros())
         };
-        // To the joint's axis with the link before, from there with this one; a prismatic joint does not turn,
-        // so both parts move alike.
+        // To the joint's axis with the link before, from there with this one; a prismatic joint does not
+        // turn, so both parts move alike.
         let (to_axis, from_axis) = (point - p, p_next - point);
         let acc = self.acc
             + dw.cross(&to_axis)

@@ -153,7 +153,7 @@ fn of_accepted(study: &Study<'_>, model: &Model, place: usize, accepted: &Accept
 impl Judged<'_> {
     /// The error of some residuals on this log.
     fn error(&self, sigma: &[f64], residual: &Signals) -> Option<f64> {
-        error_in_log(self.data, residual, sigma, self.log)
+        error_in_log(self.data, residual, sigma, (self.log, 1))
     }
 
     /// When the log begins and ends, in its own t, s.

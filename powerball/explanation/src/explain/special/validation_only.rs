@@ -340,9 +340,12 @@ impl Pooled<'_> {
     }
 }
 
+/// Rows below which a joint says nothing about a log.
+const ROWS: usize = 51;
+
 /// How many times the squared error of the fitted logs a log of other data has, mean over joints.
 fn oddness(base: &Fit, other: &Data<'_>, residual: &[Vec<f64>], log: usize) -> f64 {
-    error_in_log(other, residual, &base.sigma, log).unwrap_or(0.0)
+    error_in_log(other, residual, &base.sigma, (log, ROWS)).unwrap_or(0.0)
 }
 
 /// What the logs for which `of` holds have of that beyond the fitted logs, in all.
