@@ -95,6 +95,10 @@ fn describe_bounds_the_rounding_where_the_arm_has_limits() {
     assert_eq!(without.collect::<BTreeSet<_>>(), BTreeSet::from(expected));
     let inertia = &given["rounding"]["task_inertia"];
     assert!(of(&given, "task_inertia", "f64").iter().all(|x| *x < 1e-5), "{inertia}");
+    let inverse = of(&given, "dynamically_consistent_inverse", "f64");
+    assert!(inverse.len() == 36 && inverse.iter().all(|x| *x < 1e-5), "{inverse:?}");
+    let loaded = of(&given, "forward_dynamics_with_payload", "f64");
+    assert!(loaded.len() == 6 && loaded.iter().all(|x| *x < 1e-4), "{loaded:?}");
     assert!(inertia["f32"][0].is_null() && inertia["why"].as_str().unwrap().contains("in f32"), "{inertia}");
     let poses = &inertia["where"];
     assert_eq!(poses["task_inertia_diagonal_at_most"].as_array().unwrap().len(), 6, "{inertia}");

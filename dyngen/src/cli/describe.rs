@@ -7,7 +7,7 @@ use dyngen::base::choice;
 use dyngen::base::sets::{Class, combination_text};
 use dyngen::base::symmetry::{Removed, Symmetry};
 use dyngen::base::{ParameterSet, SetKind};
-use dyngen::describe::{BoundsFor, Description, Rounding, Weak, exact_rows, why_unbounded};
+use dyngen::describe::{BoundsFor, Description, Rounding, Weak, exact_rows, poses_of, why_unbounded};
 use dyngen::exact::rational::{self, Rational};
 use dyngen::graph::Operations;
 use dyngen::{Function, Model, Values};
@@ -280,7 +280,7 @@ fn rounding_table(t: &mut String, arm: &Arm, rounding: &Rounding) {
     by_joint(t, arm, rounding);
     let mut only: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for (function, bounds) in &rounding.functions {
-        if let Some(poses) = bounds.as_ref().ok().and_then(|of| of.poses.as_ref()) {
+        if let Some(poses) = poses_of(bounds) {
             only.entry(poses.text()).or_default().push(function.name());
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::arm::{Arm, Joint};
 use crate::dynamics::Function;
-use crate::rounding::Bounds;
+use crate::rounding::{Bounds, Where};
 use serde_json::{Map, Value, json};
 
 /// For which parameters bounds hold.
@@ -19,10 +19,12 @@ impl ParameterRange {
     pub fn text(self) -> &'static str {
         match self {
             ParameterRange::Values => {
-                "the given values; e, f and the payload, a body's: each number within ±1"
+                "the given values; each number of e, f, a direction and a payload within ±1, a payload of \
+                 forward_dynamics_with_payload as a body can have it"
             }
             ParameterRange::Unit => {
-                "each within ±1 SI unit, as no values are given; e, f and the payload, a body's: each number within ±1"
+                "each within ±1 SI unit, as no values are given; so is each number of e, f, a direction and a \
+                 payload"
             }
         }
     }
@@ -54,7 +56,7 @@ impl Rounding {
                 Ok(bounds) => json!({"f32": numbers(&bounds.single), "f64": numbers(&bounds.double)}),
                 Err(_) => json!({"f32": null, "f64": null}),
             };
-            if let Ok(Bounds { poses: Some(poses), .. }) = bounds {
+            if let Some(poses) = poses_of(bounds) {
                 object["where"] = json!({
                     "task_inertia_diagonal_at_most": numbers(&poses.largest_inertia),
                     "share_of_poses": poses.share,
@@ -69,6 +71,12 @@ impl Rounding {
     }
 }
 
+/// The poses for which a function's bounds hold, if that is not all of them.
+pub fn poses_of(bounds: &Result<Bounds, String>) -> Option<&Where> {
+    let bounds = bounds.as_ref().ok().filter(|bounds| bounds.double.iter().any(|x| x.is_finite()))?;
+    bounds.poses.as_ref()
+}
+
 /// Why a function has no bound, or one of its outputs has none in `f32`.
 pub fn why_unbounded(bounds: &Result<Bounds, String>) -> Option<&str> {
     let is_bounded = |all: &[f64]| all.iter().all(|x| x.is_finite());
@@ -77,6 +85,9 @@ pub fn why_unbounded(bounds: &Result<Bounds, String>) -> Option<&str> {
         Ok(bounds) if is_bounded(&bounds.single) => None,
         Ok(bounds) if is_bounded(&bounds.double) => {
             Some("in f32: its rounding may change B or Λ⁻¹ by more than this proof allows")
+        }
+        Ok(bounds) if bounds.poses.is_some() => {
+            Some("in f32 and f64: rounding may change B or Λ⁻¹ by more than this proof allows")
         }
         Ok(_) => Some("intervals of these states do not exclude a division by zero"),
     }

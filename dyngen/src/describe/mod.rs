@@ -3,7 +3,7 @@
 mod bounds;
 mod weak;
 
-pub use bounds::{ParameterRange, Rounding, why_unbounded};
+pub use bounds::{ParameterRange, Rounding, poses_of, why_unbounded};
 pub use weak::Weak;
 
 use crate::arm::{Arm, Bar, Joint, Transmission};

@@ -56,7 +56,9 @@ impl Rotor {
         let at = &arm.joints[joint];
         let ratio = to_f64(at.rotor_ratio.as_ref()?);
         let [before, _] = axis(arm.convention, at);
-        Some(Rotor { inertia: given(set, values, joint, ParameterKind::Im), ratio, axis: before.z })
+        let inertia = given(set, values, joint, ParameterKind::Im);
+        // One without inertia has no energy.
+        (inertia != 0.0).then_some(Rotor { inertia, ratio, axis: before.z })
     }
 
     /// Twice its energy where the joint moves with 1 and the links before are at rest.
@@ -75,7 +77,8 @@ fn given(set: &ParameterSet, values: &[f64], link: usize, kind: ParameterKind) -
 /// The ranges for `values` of the full set.
 ///
 /// # Errors
-/// Where a link without the rotors on it is no body with mass and volume, or the energy is more than that of
+/// Where a link without the rotors on it is no body with mass and volume, a rotor has a negative inertia, or
+/// the energy is more than that of
 /// links and rotors: bars of loops, joints that follow others, motors that drive several joints.
 pub(super) fn factors(
     arm: &Arm,
@@ -94,8 +97,8 @@ pub(super) fn factors(
     }
     let n = arm.joints.len();
     let rotors: Vec<Option<Rotor>> = (0..n).map(|i| Rotor::of(arm, set, values, i)).collect();
-    if let Some(i) = rotors.iter().position(|rotor| rotor.as_ref().is_some_and(|r| r.inertia <= 0.0)) {
-        return Err(format!("rotor {} has no inertia", i + 1));
+    if let Some(i) = rotors.iter().position(|rotor| rotor.as_ref().is_some_and(|r| r.inertia < 0.0)) {
+        return Err(format!("rotor {} has a negative inertia", i + 1));
     }
     let of = |link: usize| {
         let on_it = rotors.get(link + 1).and_then(Option::as_ref);

@@ -62,9 +62,10 @@ impl Program {
                 let so_far = SoFar { operations: &self.operations, values, deviations, errors };
                 (values[k], deviations[k]) = solves.take(running, so_far);
             }
-            // No pose of these is one where the ranges hold.
+            // The ranges hold for none of these states: Λ is too large at all of these poses, or no body has
+            // such a payload.
             if values[k].low > values[k].high {
-                return Some(EXACT);
+                return self.restricted.then_some(EXACT);
             }
             if values[k].magnitude() + deviations[k][0] >= f64::from(f32::MAX) {
                 deviations[k][0] = f64::INFINITY;

@@ -251,6 +251,13 @@ enum Divisor {
     Loaded,
 }
 
+impl Divisor {
+    /// Whether bounds hold for some states within the limits alone: poses, or payloads.
+    fn is_restricted(self) -> bool {
+        matches!(self, Divisor::Task | Divisor::Loaded)
+    }
+}
+
 fn divisor(function: Function) -> Option<Divisor> {
     use Function::*;
     match function {

@@ -6,6 +6,7 @@ use super::known::{Facts, KnownProgram};
 use super::norms::{self, Norm};
 use super::precision::{PRECISIONS, Precision};
 use super::slopes;
+use super::{Divisor, divisor};
 use crate::dynamics::FunctionGraph;
 use crate::dynamics::function::Argument;
 use crate::exact::rational;
@@ -116,6 +117,8 @@ pub(super) struct Program {
     pub(super) norms: Vec<Option<Norm>>,
     /// What is known of some where B is divided by.
     known: Option<KnownProgram>,
+    /// Whether what is known holds for some states within the limits alone.
+    pub(super) restricted: bool,
     pub(super) angles: Vec<(JointSum, Angle)>,
     /// What it reads.
     pub(super) variables: Vec<Variable>,
@@ -147,7 +150,8 @@ impl Program {
             Some(facts) => Some(facts.of(&operations, &nodes)?),
             None => None,
         };
-        Some(Program { operations, emitted, within, slopes, norms, known, angles, variables })
+        let restricted = divisor(built.function).is_some_and(Divisor::is_restricted);
+        Some(Program { operations, emitted, within, slopes, norms, known, restricted, angles, variables })
     }
 
     /// How many operations it is.

@@ -61,6 +61,9 @@ fn poses(model: &Model, values: &[f64]) -> Result<Where, String> {
         })
         .collect();
     let medians: [f64; N] = std::array::from_fn(|i| kept_by(drawn.iter().map(|x| x[i]).collect(), 0.5));
+    if !medians.iter().all(|median| median.is_finite() && *median > 0.0) {
+        return Err("J loses rank at half of the poses".to_string());
+    }
     let multiple =
         |x: &[f64; N]| x.iter().zip(&medians).fold(0.0, |most: f64, (x, median)| most.max(x / median));
     let most = kept_by(drawn.iter().map(multiple).collect(), SHARE);
