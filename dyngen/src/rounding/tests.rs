@@ -286,7 +286,7 @@ fn no_state_of_a_general_arm_is_further_off_than_its_bound() {
         for _ in 0..500 {
             let values: Vec<f64> =
                 (0..parameters).map(|_| f64::from(rng.random_range(-1.0..1.0f32))).collect();
-            let state = State::draw(model.arm(), function, &values, &mut rng);
+            let state = State::draw(model.arm(), &values, false, &mut rng);
             let double = doubles.run(&state);
             for (k, x) in singles.run(&state).into_iter().enumerate() {
                 seen[k] = seen[k].max((f64::from(x) - double[k]).abs());
@@ -354,7 +354,7 @@ fn ranges_hold_every_pose(
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let mut reached = 0.0f64;
     for _ in 0..5_000 {
-        let state = State::draw(model.arm(), function, values, &mut rng);
+        let state = State::draw(model.arm(), values, true, &mut rng);
         let flat = matrices.run(&state);
         // Where there are fewer joints, the rest is the identity.
         let entry =

@@ -21,8 +21,8 @@ pub(super) struct State(Vec<(Argument, Vec<f64>)>);
 
 impl State {
     /// Numbers of `f32` within the limits: half of the states have velocities, accelerations and torques at
-    /// their limits. A payload is ten numbers within ±1; that of a function that divides by B is a body's.
-    pub(super) fn draw(arm: &Arm, function: Function, parameters: &[f64], rng: &mut ChaCha8Rng) -> State {
+    /// their limits. A payload is ten numbers within ±1, or one that a body can have.
+    pub(super) fn draw(arm: &Arm, parameters: &[f64], of_body: bool, rng: &mut ChaCha8Rng) -> State {
         let (corner, end) = (rng.random_range(0..2) == 0, rng.random_range(0..8) == 0);
         let mut number = |low: f64, high: f64, at_end: bool| {
             let x: f64 = rng.random_range(low..=high);
@@ -54,9 +54,9 @@ impl State {
         within(Argument::Wrench, vec![1.0; 6]);
         within(Argument::PositionDirection, vec![1.0; joints.len()]);
         within(Argument::VelocityDirection, vec![1.0; joints.len()]);
-        match divisor(function) {
-            Some(_) => all.push((Argument::Payload, payload(rng))),
-            None => within(Argument::Payload, vec![1.0; 10]),
+        match of_body {
+            true => all.push((Argument::Payload, payload(rng))),
+            false => within(Argument::Payload, vec![1.0; 10]),
         }
         all.push((Argument::Parameters, parameters.to_vec()));
         State(all)
@@ -206,7 +206,7 @@ impl Seen {
         let inertia = model.function(Function::TaskInertia, SetKind::Minimal).ok();
         let mut inertia = inertia.as_ref().map(|inertia| Emitted::<f64>::new(model, inertia));
         for sample in 0..samples {
-            let state = State::draw(model.arm(), built.function, &parameters, &mut rng);
+            let state = State::draw(model.arm(), &parameters, divisor(built.function).is_some(), &mut rng);
             if let Some(Where { largest_inertia, .. }) = &bounds.poses {
                 let flat = inertia.as_mut().unwrap().run(&state);
                 if largest_inertia.iter().enumerate().any(|(i, most)| flat[7 * i] > *most) {
