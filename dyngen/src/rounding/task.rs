@@ -2,7 +2,7 @@
 //!
 //! A = Λ⁻¹ is singular where J loses rank, and Λ near such a pose is as large as one likes. So bounds hold at
 //! the poses where no entry of Λ's diagonal is above its limit lᵢ. There all follows that a solve with A
-//! needs: (A⁻¹)ᵢᵢ ≤ lᵢ, and a pivot of A is at least 1/Λᵢᵢ, since xᵀAx ≥ xᵢ²/Λᵢᵢ (Cauchy and Schwarz).
+//! needs: (A⁻¹)ᵢᵢ ≤ lᵢ, and a pivot of A is at least 1/Λᵢᵢ, since xᵀ·A·x ≥ xᵢ²/Λᵢᵢ (Cauchy and Schwarz).
 
 use super::Where;
 use super::factors::{Factors, ROUNDED};
