@@ -340,7 +340,7 @@ fn what_dyngen_does_not_print_is_refused() {
         // Comments, lines and numbers that a compiler takes in another way.
         (Language::C, " + ", " //* */ + "),
         (Language::C, "const real x3", "// \\\nconst real x3"),
-        (Language::C, "/* Do not", "/* ??/\n Do not"),
+        (Language::C, "Do not", "*??/\n/ Do not"),
         (Language::C, "(real)1.0;\n    const real x4", "(real)1;\n    const real x4"),
         (Language::C, ".h\"\n", ".h\"\\\n"),
         (Language::Cuda, " + ", " //* */ + "),
@@ -349,8 +349,8 @@ fn what_dyngen_does_not_print_is_refused() {
         (Language::Rust, "fn angles_3<", &format!("{other}\nfn angles_3<")),
         (
             Language::Rust,
-            "pub const MASS_MATRIX_NONZERO",
-            "pub const TWIST_NONZERO: [(usize, usize); 1] = [(0, 0)];\npub const MASS_MATRIX_NONZERO",
+            "pub const PARAMETER_NAMES",
+            "pub const TWIST_NONZERO: [(usize, usize); 1] = [(0, 0)];\npub const PARAMETER_NAMES",
         ),
         (
             Language::Rust,

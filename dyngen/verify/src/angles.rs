@@ -296,14 +296,12 @@ joint = [
     #[test]
     fn each_of_many_followers_has_a_sine() {
         let follower = |k: usize| {
-            format!(
-                "    {{ kind = \"revolute\", a = 1, alpha = 0, d = 0, theta = 0.{k}1, mimic = {{ joint = 2, ratio = -1 }} }},\n]"
-            )
+            let mimic = "mimic = { joint = 2, ratio = -1 }";
+            format!("{{ kind = \"revolute\", a = 1, alpha = 0, d = 0, theta = 0.{k}1, {mimic} }},\n")
         };
-        let many = (1..=MOST_PHASES + 2).fold(ARM.trim_end().to_string(), |text, k| {
-            format!("{}{}", text.trim_end_matches(']'), follower(k))
-        });
-        let arm = Arm::parse(&many, "arm.toml").unwrap();
+        let followers: String = (1..=MOST_PHASES + 2).map(follower).collect();
+        let text = format!("{}{followers}]", ARM.trim_end().trim_end_matches(']'));
+        let arm = Arm::parse(&text, "arm.toml").unwrap();
         let circle = Circle::draw(&arm, &constant_angles(&arm), &mut Draws::new(3));
         let lacks = (0..arm.joints.len()).find(|i| circle.sine_and_cosine(&of_joint(&arm, *i)).is_none());
         assert_eq!((arm.joints.len(), lacks), (MOST_PHASES + 5, None));

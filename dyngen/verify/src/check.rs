@@ -23,8 +23,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 /// it vanishes at one point with probability below 2⁻⁵⁴.
 const POINTS: usize = 2;
 
-/// Of the points, with the text: no file can be made for the points that it is proven at. The proof before a
-/// file is written has another one.
+/// Of the points, with the text, so that another text is proven at other points. The proof before a file is
+/// written has another one.
 const SEED: u64 = 0x7665_7269_6679;
 
 /// Proves files of one arm.
@@ -176,7 +176,7 @@ impl Verifier {
             let arm = &self.arms[0].1;
             report.difference = friction::check(&source, arm, self.seed, &called, &mut report.proven)
                 .or_else(|| superfluous(&source, &called, &report.proven));
-            report.proven.extend(source.kernels.iter().cloned());
+            report.proven.extend(source.kernels);
         }
         Ok(report)
     }
