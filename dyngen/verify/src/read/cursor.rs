@@ -14,8 +14,8 @@ pub(crate) struct Dialect {
     pub(crate) number: (&'static str, &'static str),
 }
 
-/// Words, numbers, strings, lines of the preprocessor and single characters (`->` and `//` are one), each with
-/// its line.
+/// Words, numbers, strings, lines of the preprocessor and single characters (`->` and `//` are one), each
+/// with its line.
 fn tokens(text: &str, dialect: &Dialect) -> Vec<(usize, String)> {
     let (opens, closes) = dialect.comment;
     let (mut found, mut rest, mut line) = (Vec::new(), text, 1);
