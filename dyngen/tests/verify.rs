@@ -338,12 +338,12 @@ fn what_dyngen_does_not_print_is_refused() {
     assert!(negative.contains("-q1"));
     let cases = [
         // Comments, lines and numbers that a compiler takes in another way.
-        (Language::C, " + ", " //* */ + "),
-        (Language::C, "const real x3", "// \\\nconst real x3"),
-        (Language::C, "Do not", "*??/\n/ Do not"),
+        (Language::C, "p4 * x12;", "p4 * x12 //* */ (real)1.0\n;"),
+        (Language::C, "const real x13", "/* *\\\n/ 1 /* */ const real x13"),
+        (Language::C, "const real x13", "/* *??/\n/ 1 /* */ const real x13"),
         (Language::C, "(real)1.0;\n    const real x4", "(real)1;\n    const real x4"),
         (Language::C, ".h\"\n", ".h\"\\\n"),
-        (Language::Cuda, " + ", " //* */ + "),
+        (Language::Cuda, "p4 * x12;", "p4 * x12 //* */ (real)1.0\n;"),
         // What nothing calls, and the structure of what is not there.
         (Language::Rust, "pub mod elbow {\n", &format!("pub mod elbow {{\n{friction}\n")),
         (Language::Rust, "fn angles_3<", &format!("{other}\nfn angles_3<")),
