@@ -307,3 +307,138 @@ fn a_file_of_kinematics_alone_is_proven() {
         (["Trig::new", "jacobian", "jacobian_with"].map(String::from).into(), None)
     );
 }
+
+/// Files that are wrong where a proof of what functions print does not look.
+#[test]
+fn what_dyngen_does_not_print_is_refused() {
+    let path = root().join("tests/arms/twist.toml");
+    let functions = [Function::Gravity, Function::MassMatrix, Function::Jacobian];
+    let config = Config::new(&path).functions(functions);
+    let of = |language: Language, batch: bool| {
+        let text = config.clone().language(language).batch(batch).source().unwrap();
+        let verifier = Verifier::new(Arm::read(&path).unwrap(), language, &text).unwrap();
+        assert_eq!(verifier.verify(&text, None).unwrap().difference, None, "{language}");
+        (text, verifier)
+    };
+    let files = [
+        (Language::Rust, of(Language::Rust, true)),
+        (Language::C, of(Language::C, false)),
+        (Language::Cuda, of(Language::Cuda, false)),
+        (Language::Wgsl, of(Language::Wgsl, false)),
+    ];
+    let rust = &files[0].1.0;
+    let block = |from: &str, until: &str| {
+        let at = rust.find(from).unwrap();
+        rust[at..at + rust[at..].find(until).unwrap() + until.len()].to_string()
+    };
+    let friction = "pub fn friction<T: SimdRealField + Copy>(dq: &SVector<T, JOINTS>) -> SVector<T, JOINTS> \
+        { SVector::from_array_storage(ArrayStorage([[T::zero(), T::zero(), T::zero()]])) }";
+    let other = block("fn angles_3<", "\n}\n").replace("angles_3", "angles_9");
+    let negative = block("fn angles_1<", "\n}\n").replace("[q1]\n", "[-q1]\n");
+    assert!(negative.contains("-q1"));
+    let cases = [
+        // Comments, lines and numbers that a compiler takes in another way.
+        (Language::C, "p4 * x12;", "p4 * x12 //* */ (real)1.0\n;"),
+        (Language::C, "const real x13", "/* *\\\n/ 1 /* */ const real x13"),
+        (Language::C, "const real x13", "/* *??/\n/ 1 /* */ const real x13"),
+        (Language::C, "(real)1.0;\n    const real x4", "(real)1;\n    const real x4"),
+        (Language::C, ".h\"\n", ".h\"\\\n"),
+        (Language::Cuda, "p4 * x12;", "p4 * x12 //* */ (real)1.0\n;"),
+        // What nothing calls, and the structure of what is not there.
+        (Language::Rust, "pub mod elbow {\n", &format!("pub mod elbow {{\n{friction}\n")),
+        (Language::Rust, "fn angles_3<", &format!("{other}\nfn angles_3<")),
+        (
+            Language::Rust,
+            "pub const PARAMETER_NAMES",
+            "pub const TWIST_NONZERO: [(usize, usize); 1] = [(0, 0)];\npub const PARAMETER_NAMES",
+        ),
+        (
+            Language::Rust,
+            "pub fn mass_matrix<T: SimdRealField + Copy, const",
+            "pub fn coriolis_matrix<T: SimdRealField + Copy, const",
+        ),
+        // Another function of the name in the module of a frame.
+        (Language::Rust, "pub mod elbow {\n", &format!("pub mod elbow {{\n{negative}\n")),
+        (Language::Rust, "= super::gravity_with(&trig", "= gravity_with(&trig"),
+        // Attributes, also within.
+        (Language::Rust, "let z = r * r;", "#[cfg(any())]\nlet z = r * r;"),
+        (Language::Rust, "use nalgebra::{Array", "#![feature(x)]\nuse nalgebra::{Array"),
+        (
+            Language::Rust,
+            "derive(Clone, Copy, Debug, PartialEq)",
+            "derive(Clone, Copy, Debug, PartialEq, Other)",
+        ),
+        (
+            Language::Rust,
+            "let trig = Trig {\n",
+            "let trig = Trig {\nsin: [T::zero(), T::zero(), T::zero()],\n",
+        ),
+        // Arrays over samples.
+        (Language::Rust, "let [q1, q2, q3] = q;", "let [q1, q2, q3] = dq;"),
+        (Language::Rust, "let [q1, q2, q3] = q;", "let [q1, q2, q3] = q; let [q1, q2, q3] = q;"),
+        (Language::Rust, "for lane in 0..LANES {\n", "for lane in 0..LANES {\nlet q3 = q1;\n"),
+        (
+            Language::Rust,
+            "for lane in 0..LANES {\n",
+            "for lane in 0..LANES {\nlet far = trigonometry::near(q1[lane]);\n",
+        ),
+        (Language::Rust, "= x1_1;", "= x1_1[lane];"),
+        // Numbers that are zero modulo the prime.
+        (Language::Rust, "0.2f64", "2305843009213693951.2f64"),
+        // Lists and places.
+        (Language::C, "\"m2 + m3\",", "\"m2 + m3\""),
+        (Language::C, "\"m2 + m3\",", "\"m2 + m3\";"),
+        (Language::C, "twist_parameter_names[TWIST_PARAMETERS] = {", "twist_parameter_names[1] = {"),
+        (Language::C, "_parameter_names[TWIST_PARAMETERS] = {", "_parameter_names[TWIST_PARAMETERS] = 1 + {"),
+        (Language::C, "&prepared, result);", "result, &prepared);"),
+        (Language::C, "&prepared, result);", "prepared, result);"),
+        (Language::C, "&trig.sin[2]", "&trig.sin[99999999999]"),
+        (Language::Wgsl, "@binding(13)", "@binding(14)"),
+        (Language::Wgsl, "@binding(12)", "@binding(11)"),
+        // Sums.
+        (Language::C, "\"m2 + m3\"", "\"m2^2 + m3\""),
+        (Language::C, "\"m2 + m3\"", "\"m2 + m1844674407370955162\""),
+    ];
+    let mut passed = Vec::new();
+    for (language, old, new) in cases {
+        let (text, verifier) = &files.iter().find(|(of, _)| *of == language).unwrap().1;
+        let changed = text.replacen(old, new, 1);
+        let found = verifier.verify(&changed, None);
+        if changed == *text || found.is_ok_and(|report| report.difference.is_none()) {
+            passed.push(format!("{language}: {old} -> {new}"));
+        }
+    }
+    assert!(passed.is_empty(), "passed, or there is no such text:\n{}", passed.join("\n"));
+}
+
+#[test]
+fn arms_with_loops_transmissions_and_followers_are_proven() {
+    let mimic = r#"
+name = "follower"
+convention = "modified"
+gravity = [0, 0.5, -9.81]
+joint = [
+    { kind = "revolute", a = 0, alpha = 0, d = 0.5, theta = 0.3, rotor_ratio = 100 },
+    { kind = "revolute", a = 0.3, alpha = "-pi/2", d = 0, theta = 0, rotor_ratio = 80 },
+    { kind = "revolute", a = 0.4, alpha = 0, d = 0.1, theta = 0.4, mimic = { joint = 2, ratio = "-3/2", offset = 0.2 } },
+    { kind = "prismatic", a = 0.1, alpha = "pi/2", d = 0, theta = 0 },
+]
+"#;
+    let transmission = mimic.replace(", mimic = { joint = 2, ratio = \"-3/2\", offset = 0.2 }", "")
+        + "\n[[transmission]]\njoints = [1, 2]\nmatrix = [[1, 0], [\"1/2\", 1]]\n";
+    for (name, arm) in
+        [("mimic", mimic), ("transmission", &transmission), ("loop", include_str!("loops/crank.toml"))]
+    {
+        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}_verified.toml"));
+        std::fs::write(&path, arm).unwrap();
+        for language in [Language::Rust, Language::C] {
+            let config = Config::new(&path).language(language).functions(FUNCTIONS);
+            let config = config.friction(["viscous".parse().unwrap()]).batch(language == Language::Rust);
+            let text = config.source().unwrap();
+            let verifier = Verifier::new(Arm::read(&path).unwrap(), language, &text).unwrap();
+            let report = verifier.verify(&text, None).unwrap();
+            assert_eq!(report.difference, None, "{name}, {language}");
+            assert!(report.proven.iter().any(|proven| proven == "friction"), "{name}, {language}");
+        }
+    }
+}

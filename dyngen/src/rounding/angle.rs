@@ -98,11 +98,11 @@ fn rounded(value: Interval, errors: Errors) -> Errors {
 
 /// The emitted sine and cosine of an angle of the format, in units of [`Precision::unit`], up to [`LARGEST`].
 ///
-/// `f32`: 0.85 of every number (a test of `emit/accuracy.rs`). `f64`, by hand for |r| ≤ π/4 after the
-/// reduction, which is exact to 1e-30: of the sine 0.5 for the last sum, 0.13 for product and sum of the
-/// correction, 0.11 for r², 0.07 for the polynomial, 0.04 for its approximation (2⁻⁵⁸, fdlibm) and the tail;
-/// of the cosine 0.5, 0.22 for r², 0.06 for the correction and 0.07 for approximation and tail, as 1 − r²/2
-/// is compensated.
+/// `f32`: 0.85 of every number (a test of `dyngen/verify/src/text/accuracy.rs`). `f64`, by hand for |r| ≤
+/// π/4 after the reduction, which is exact to 1e-30: of the sine 0.5 for the last sum, 0.13 for product and
+/// sum of the correction, 0.11 for r², 0.07 for the polynomial, 0.04 for its approximation (2⁻⁵⁸, fdlibm)
+/// and the tail; of the cosine 0.5, 0.22 for r², 0.06 for the correction and 0.07 for approximation and
+/// tail, as 1 − r²/2 is compensated.
 const SINE_ERROR: f64 = 1.0;
 
 /// In rad.

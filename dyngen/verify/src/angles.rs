@@ -105,7 +105,7 @@ struct Unit {
     sine_and_cosine: (Fp, Fp),
 }
 
-/// Sums of more constants than this are not looked for.
+/// Sums of the constants of more joints than this are not looked for.
 const MOST_PHASES: usize = 6;
 
 impl Circle {
@@ -132,15 +132,18 @@ impl Circle {
         };
         let coordinates: Vec<Unit> = arm.coordinates().into_iter().enumerate().map(of_coordinate).collect();
         let following = (0..arm.links()).filter(|i| arm.phase(*i).quarter_turns().is_none());
-        let mut phases = BTreeMap::from([((Rational::ZERO, Rational::ZERO), (Fp::ZERO, Fp::ONE))]);
-        for joint in following.take(MOST_PHASES) {
+        let none = (Rational::ZERO, Rational::ZERO);
+        let mut phases = BTreeMap::from([(none.clone(), (Fp::ZERO, Fp::ONE))]);
+        for (n, joint) in following.enumerate() {
             let theta = affine(&arm.joints[joint].theta_in_angle());
             let phase = rest(&position(arm, joint).plus(&integer(1), &theta), &coordinates);
             // Where only the sum of two angles matters, their constants must be numbers: to 1e-12 rad, as
             // everywhere in dyngen.
             let (s, c) = circle_point_near(arm.phase(joint).radians());
             let (s, c) = (residue(&s), residue(&c));
-            let known: Vec<_> = phases.iter().map(|(k, x)| (k.clone(), *x)).collect();
+            // Each joint's own angle must be there; sums would become too many.
+            let summed = phases.iter().filter(|(k, _)| n < MOST_PHASES || **k == none);
+            let known: Vec<_> = summed.map(|(k, x)| (k.clone(), *x)).collect();
             for ((radians, turns), at) in known {
                 for sign in [1, -1] {
                     let sum = Affine::constant(radians.clone(), turns.clone()).plus(&integer(sign), &phase);
@@ -288,5 +291,19 @@ joint = [
         let (s, c) = of(&Affine::constant(Rational::ZERO, ratio(3, 2)));
         assert_eq!((s, c), (-Fp::ONE, Fp::ZERO));
         assert_eq!(circle.of_constant(&Angle::parse("0.4").unwrap()), circle.of_constants[0]);
+    }
+
+    #[test]
+    fn each_of_many_followers_has_a_sine() {
+        let follower = |k: usize| {
+            let mimic = "mimic = { joint = 2, ratio = -1 }";
+            format!("{{ kind = \"revolute\", a = 1, alpha = 0, d = 0, theta = 0.{k}1, {mimic} }},\n")
+        };
+        let followers: String = (1..=MOST_PHASES + 2).map(follower).collect();
+        let text = format!("{}{followers}]", ARM.trim_end().trim_end_matches(']'));
+        let arm = Arm::parse(&text, "arm.toml").unwrap();
+        let circle = Circle::draw(&arm, &constant_angles(&arm), &mut Draws::new(3));
+        let lacks = (0..arm.joints.len()).find(|i| circle.sine_and_cosine(&of_joint(&arm, *i)).is_none());
+        assert_eq!((arm.joints.len(), lacks), (MOST_PHASES + 5, None));
     }
 }

@@ -1,12 +1,14 @@
 //! The functions of a file against the Lagrangian, at random points of the prime field.
 
-use crate::angles::{Affine, constant_angles};
-use crate::language::{ONE_BY_ONE, Routines, Stop, Value, World, by_rows};
+use crate::angles::{Affine, Circle, constant_angles, of_joint};
+use crate::language::{Called, ONE_BY_ONE, Routines, Stop, Value, World, by_rows};
 use crate::matrix::{reduce, times};
 use crate::point::Point;
 use crate::read::head::{Head, Literals};
 use crate::read::{c, rust, wgsl};
-use crate::{Angles, Checked, Difference, Report, Source, Unreadable, friction, structure_of, sums};
+use crate::{
+    Angles, Checked, Difference, Report, Source, Unreadable, friction, is_structure, structure_of, sums,
+};
 use dyngen_arm::Language;
 use dyngen_arm::arm::{Arm, JointKind};
 use dyngen_arm::exact::prime::{Draws, Fp};
@@ -15,12 +17,14 @@ use dyngen_arm::function::{Argument, Function, Size};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fmt;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Random points for each function. A wrong formula is a polynomial that is not zero; with degrees below 100
 /// it vanishes at one point with probability below 2⁻⁵⁴.
 const POINTS: usize = 2;
 
-/// Of the points; the proof before a file is written has another one.
+/// Of the points, with the text, so that another text is proven at other points. The proof before a file is
+/// written has another one.
 const SEED: u64 = 0x7665_7269_6679;
 
 /// Proves files of one arm.
@@ -30,6 +34,7 @@ pub struct Verifier {
     arms: Vec<(String, Arm)>,
     set: String,
     language: Language,
+    seed: u64,
     values: Option<Vec<f64>>,
     /// What the Lagrangian says, by function and point, where that does not depend on the file.
     known: RefCell<BTreeMap<(String, usize), Vec<Fp>>>,
@@ -117,7 +122,7 @@ struct Place<'p> {
 }
 
 impl Verifier {
-    /// For files like this one of an arm.
+    /// For files like this one of an arm; the text decides the random points.
     ///
     /// # Errors
     /// As [`Error`] says.
@@ -128,11 +133,15 @@ impl Verifier {
             return Err(Error::OtherArm(head.arm, hash));
         }
         let source = read(text, language, &arm)?;
+        has_sines(&arm)?;
         let values = source.constants.get("PARAMETER_VALUES").map(|(_, entries)| numbers(entries));
         let at_frame = |name: &str| Some((format!("{name}::"), arm.at_frame(name)?));
         let frames: Vec<_> = arm.frames.iter().filter_map(|frame| at_frame(&frame.name)).collect();
         let arms = std::iter::once((String::new(), arm)).chain(frames).collect();
-        Ok(Verifier { arms, set: head.set, language, values, known: RefCell::default() })
+        let mut hasher = DefaultHasher::new();
+        text.hash(&mut hasher);
+        let seed = SEED ^ hasher.finish();
+        Ok(Verifier { arms, set: head.set, language, seed, values, known: RefCell::default() })
     }
 
     /// The name of the set of the file.
@@ -156,14 +165,17 @@ impl Verifier {
             return Ok(crate::wrong(*line, &format!("the arm has no frame {module}"))?);
         }
         let mut report = Report { not_checked: source.not_checked.clone(), ..Report::default() };
+        let called = Called::default();
         report.difference = self.constants(&source);
         for (module, arm) in &self.arms {
             if report.difference.is_none() {
-                report.difference = self.module(&source, module, arm, only, &mut report.proven);
+                report.difference = self.module(&source, module, arm, only, &called, &mut report.proven);
             }
         }
         if report.difference.is_none() && only.is_none() {
-            report.difference = friction::check(&source, &self.arms[0].1, &mut report.proven);
+            let arm = &self.arms[0].1;
+            report.difference = friction::check(&source, arm, self.seed, &called, &mut report.proven)
+                .or_else(|| superfluous(&source, &called, &report.proven));
             report.proven.extend(source.kernels);
         }
         Ok(report)
@@ -214,7 +226,7 @@ impl Verifier {
             line: *line,
             message,
         };
-        let (mut draws, constants) = (Draws::new(SEED), constant_angles(&self.arms[0].1));
+        let (mut draws, constants) = (Draws::new(self.seed), constant_angles(&self.arms[0].1));
         let mut place = || {
             let mut point = Point::draw(arm, &constants, &mut draws);
             let of = |name: &String| {
@@ -240,6 +252,7 @@ impl Verifier {
         module: &str,
         arm: &Arm,
         only: Option<&[Function]>,
+        called: &Called,
         proven: &mut Vec<String>,
     ) -> Option<Difference> {
         let has = |f: &Function| {
@@ -252,7 +265,7 @@ impl Verifier {
             Err(difference) => return Some(difference),
         };
         for (k, place) in places.iter().enumerate() {
-            let world = |point| World { routines: &source.routines, point };
+            let world = |point| World { routines: &source.routines, point, called };
             let worlds = place.points.each_ref().map(world);
             if module.is_empty() && !self.sums_determine_torques(place, k) {
                 let line = source.constants.get("PARAMETER_NAMES").map_or(1, |(line, _)| *line);
@@ -266,7 +279,12 @@ impl Verifier {
             }
             for function in functions.iter().copied() {
                 let name = format!("{module}{function}");
-                let right = self.expected(place, k, &name, function);
+                let Some(right) = self.expected(place, k, &name, function) else {
+                    let mut calls = self.calls(source, &name, function).into_iter();
+                    let line = calls.find_map(|call| source.routines.get(&call.name)).map_or(1, |r| r.line);
+                    let message = "has no value for this arm".to_string();
+                    return Some(Difference { function: name, entry: None, line, message });
+                };
                 for call in self.calls(source, &name, function) {
                     let found = compared(function, |zero| call.result(&worlds[zero], place));
                     let difference = match &found {
@@ -298,16 +316,17 @@ impl Verifier {
         None
     }
 
-    /// What the Lagrangian says of a function at a point.
-    fn expected(&self, place: &Place<'_>, k: usize, name: &str, function: Function) -> Vec<Fp> {
+    /// What the Lagrangian says of a function at a point; nothing where it has no value.
+    fn expected(&self, place: &Place<'_>, k: usize, name: &str, function: Function) -> Option<Vec<Fp>> {
         let key = (name.to_string(), k);
         // Values that are baked in belong to the names of a file.
         if let Some(known) = self.known.borrow().get(&key).filter(|_| self.values.is_none()) {
-            return known.clone();
+            return Some(known.clone());
         }
-        let right = compared(function, |zero| Ok(place.points[zero].expected(function))).unwrap_or_default();
+        let none = || Stop { line: 1, message: String::new() };
+        let right = compared(function, |zero| place.points[zero].expected(function).ok_or_else(none)).ok()?;
         self.known.borrow_mut().insert(key, right.clone());
-        right
+        Some(right)
     }
 
     /// Whether the sums of the set determine the torques: the regressor of all the arm's parameters is a
@@ -317,7 +336,9 @@ impl Verifier {
         let parameters = arm.all_parameters();
         let (mut sums, all) = (place.sums.clone(), parameters.len());
         let pivots = reduce(&mut sums, all);
-        let regressor = self.expected(place, k, Function::Regressor.name(), Function::Regressor);
+        let Some(regressor) = self.expected(place, k, Function::Regressor.name(), Function::Regressor) else {
+            return false;
+        };
         let is_combination = |row: &[Fp]| {
             let rest = pivots.iter().zip(&sums).fold(row.to_vec(), |rest, (pivot, sum)| {
                 rest.iter().zip(sum).map(|(x, y)| *x - row[*pivot] * *y).collect()
@@ -342,6 +363,31 @@ impl Verifier {
         }
         calls
     }
+}
+
+/// Whether the sine of each joint's angle can be formed, on which the Lagrangian relies.
+fn has_sines(arm: &Arm) -> Checked<()> {
+    let circle = Circle::draw(arm, &constant_angles(arm), &mut Draws::new(SEED));
+    let lacks = |i: &usize| {
+        arm.joints[*i].kind == JointKind::Revolute && circle.sine_and_cosine(&of_joint(arm, *i)).is_none()
+    };
+    match (0..arm.joints.len()).find(lacks) {
+        Some(i) => crate::wrong(1, &format!("the sine of the angle of joint {} cannot be formed", i + 1)),
+        None => Ok(()),
+    }
+}
+
+/// What a file has and nothing has looked at: a function that was not called, or the structure of one that is
+/// not proven.
+fn superfluous(source: &Source, called: &Called, proven: &[String]) -> Option<Difference> {
+    let called = called.borrow();
+    let routine = source.routines.iter().find(|(name, _)| !called.contains(name.as_str()));
+    let routine = routine.map(|(name, routine)| (name, routine.line));
+    let is_proven = |name: &str| proven.iter().any(|function| structure_of(function) == name);
+    let constant = || source.constants.iter().find(|(name, _)| is_structure(name) && !is_proven(name));
+    let (name, line) = routine.or_else(|| constant().map(|(name, (line, _))| (name, *line)))?;
+    let message = "is nothing that a file has here".to_string();
+    Some(Difference { function: name.clone(), entry: None, line, message })
 }
 
 /// What a file states about where a matrix is not zero, against the entries at a point, which are proven: one

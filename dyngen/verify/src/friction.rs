@@ -2,7 +2,7 @@
 //! joints.
 
 use crate::angles::{constant_angles, residue};
-use crate::language::{Exact, Expr, Kind, Routine, Stop, Value, World, by_rows, free};
+use crate::language::{Called, Exact, Expr, Kind, Routine, Stop, Value, World, by_rows, free};
 use crate::point::Point;
 use crate::{Difference, Source};
 use dyngen_arm::Arm;
@@ -17,11 +17,21 @@ const SEED: u64 = 0x6672_6963_7469_6f6e;
 type Term = (Option<&'static str>, Rational);
 
 /// Proves friction where the file has it; gives where it differs.
-pub(crate) fn check(source: &Source, arm: &Arm, proven: &mut Vec<String>) -> Option<Difference> {
+pub(crate) fn check(
+    source: &Source,
+    arm: &Arm,
+    seed: u64,
+    called: &Called,
+    proven: &mut Vec<String>,
+) -> Option<Difference> {
     let names = ["friction_columns", "friction"];
     let [columns, friction] = match names.map(|name| source.routines.get(name)) {
         [Some(columns), Some(friction)] => [columns, friction],
-        [None, None] => return None,
+        [None, None] => {
+            let there = ["FRICTION_TERMS", "MOTOR_VELOCITIES"].map(|name| (name, source.constants.get(name)));
+            let (name, found) = there.into_iter().find(|(_, found)| found.is_some())?;
+            return differs(name, found?.0, None, "stands without functions of friction");
+        }
         [one, other] => {
             let line = one.or(other).map_or(1, |routine| routine.line);
             return differs("friction", line, None, "stands without the other function of friction");
@@ -42,10 +52,10 @@ pub(crate) fn check(source: &Source, arm: &Arm, proven: &mut Vec<String>) -> Opt
     if let Some((line, _)) = said.filter(|(_, said)| *said != [terms.len().to_string()]) {
         return differs("FRICTION_TERMS", *line, None, "is another number of terms");
     }
-    let mut draws = Draws::new(SEED);
+    let mut draws = Draws::new(SEED ^ seed);
     for _ in 0..2 {
         let point = Point::draw(arm, &constant_angles(arm), &mut draws);
-        let world = World { routines: &source.routines, point: &point };
+        let world = World { routines: &source.routines, point: &point, called };
         let n = point.dof();
         let mut vector = || (0..n).map(|_| draws.element()).collect::<Vec<Fp>>();
         let dq = vector();

@@ -14,8 +14,9 @@ type Columns = Vec<Vec<Fp>>;
 
 impl Point<'_> {
     /// The result of a function, row by row; where parameters have a column or a row each, for all those of
-    /// the arm.
-    pub(crate) fn expected(&self, function: Function) -> Vec<Fp> {
+    /// the arm. Nothing where the function has no value for the arm, such as the inertia in the task's
+    /// coordinates of one with fewer than six joints.
+    pub(crate) fn expected(&self, function: Function) -> Option<Vec<Fp>> {
         use Function::*;
         let n = self.dof();
         let (v, a, e) = (self.rates(), self.vector(Argument::Accelerations), self.vector(Argument::Errors));
@@ -27,7 +28,7 @@ impl Point<'_> {
             let all = 11 * self.arm.bodies();
             self.bodies_alone(&columns, all)
         };
-        match function {
+        Some(match function {
             InverseDynamics | InverseDynamicsWithPayload => self.torques(loaded),
             InverseDynamicsWithoutGravity => self.weighed(&self.forces(&moving(), false, 0), false),
             Regressor => by_row(self.forces(&moving(), true, 0)),
@@ -35,7 +36,7 @@ impl Point<'_> {
             SlotineLiRegressor => by_row(self.slotine_li()),
             SlotineLiTransposeTimes => self.transpose_times(&self.slotine_li()),
             MassMatrix | MassMatrixWithPayload => mass_matrix(),
-            MassMatrixInverse => inverse(mass_matrix(), n),
+            MassMatrixInverse => inverse(mass_matrix(), n)?,
             CoriolisMatrix | CoriolisMatrixWithPayload => self.coriolis_matrix(loaded),
             CoriolisTimesVelocity => self.weighed(&self.forces(&motion(v, v, zeros), false, 0), false),
             CoriolisTransposeTimesVelocity => times(&transposed(&self.coriolis_matrix(false), n), v, n),
@@ -56,7 +57,7 @@ impl Point<'_> {
                     _ => Self::velocity_changed,
                 };
                 let derivatives = self.torque_derivatives(of);
-                times(&inverse(mass_matrix(), n), &derivatives, n).into_iter().map(|x| -x).collect()
+                times(&inverse(mass_matrix(), n)?, &derivatives, n).into_iter().map(|x| -x).collect()
             }
             MassMatrixRate => self.by_columns(|j| {
                 let motion = Self::position_changed(motion(zeros, zeros, &unit(n, j)), DIRECTIONS[0], v);
@@ -85,24 +86,24 @@ impl Point<'_> {
             }
             BodyJacobian => self.body_jacobian(),
             SpatialJacobian => self.spatial_jacobian(),
-            TaskInertiaInverse => self.task_inertia_inverse(),
-            TaskInertia => inverse(self.task_inertia_inverse(), 6),
+            TaskInertiaInverse => self.task_inertia_inverse()?,
+            TaskInertia => inverse(self.task_inertia_inverse()?, 6)?,
             ConsistentInverse => {
-                let driven = times(&inverse(mass_matrix(), n), &transposed(&self.jacobian(), n), n);
-                times(&driven, &inverse(self.task_inertia_inverse(), 6), 6)
+                let driven = times(&inverse(mass_matrix(), n)?, &transposed(&self.jacobian(), n), n);
+                times(&driven, &inverse(self.task_inertia_inverse()?, 6)?, 6)
             }
             PayloadRegressor => {
                 let columns = self.forces(&moving(), true, 0);
                 self.bodies_alone(&columns[columns.len() - 10..], 10)
             }
-            CentreOfMass => self.centre_of_mass(),
+            CentreOfMass => self.centre_of_mass()?,
             CentreOfMassJacobian => {
-                let inverse = self.mass().inverse().unwrap_or(Fp::ZERO);
+                let inverse = self.mass().inverse()?;
                 self.total_momentum_matrix()[..3 * n].iter().map(|x| *x * inverse).collect()
             }
             TotalMomentum => times(&self.total_momentum_matrix(), v, n),
             TotalMomentumMatrix => self.total_momentum_matrix(),
-        }
+        })
     }
 
     fn rates(&self) -> &[Fp] {
@@ -293,10 +294,10 @@ impl Point<'_> {
     }
 
     /// J·B⁻¹·Jᵀ
-    fn task_inertia_inverse(&self) -> Vec<Fp> {
+    fn task_inertia_inverse(&self) -> Option<Vec<Fp>> {
         let (n, jacobian) = (self.dof(), self.jacobian());
-        let driven = times(&jacobian, &inverse(self.mass_matrix(false), n), n);
-        times(&driven, &transposed(&jacobian, n), n)
+        let driven = times(&jacobian, &inverse(self.mass_matrix(false), n)?, n);
+        Some(times(&driven, &transposed(&jacobian, n), n))
     }
 
     /// The sum of the bodies' first moments in the root link with the mass behind them.
@@ -317,11 +318,11 @@ impl Point<'_> {
         self.values.iter().step_by(11).fold(Fp::ZERO, |sum, m| sum + *m)
     }
 
-    fn centre_of_mass(&self) -> Vec<Fp> {
+    fn centre_of_mass(&self) -> Option<Vec<Fp>> {
         let zeros = vec![Fp::ZERO; self.dof()];
-        let inverse = self.mass().inverse().unwrap_or(Fp::ZERO);
+        let inverse = self.mass().inverse()?;
         let moments = self.total_first_moments(motion(&zeros, &zeros, &zeros), 0);
-        moments.into_iter().map(|x| x * inverse).collect()
+        Some(moments.into_iter().map(|x| x * inverse).collect())
     }
 
     /// Linear momentum above the angular momentum Σ r×ṙ about the root link's origin, for a unit of each

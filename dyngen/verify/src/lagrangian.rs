@@ -148,7 +148,7 @@ impl Chain<'_> {
         let d = Dual::number(residue(&row.d));
         match row.kind {
             JointKind::Revolute => {
-                // Every angle of a joint of the arm has a sine.
+                // `Verifier::new` has seen that every angle of a joint has a sine.
                 let at = self.circle.sine_and_cosine(&position).unwrap_or((Fp::ZERO, Fp::ZERO));
                 frame.turn(2, &change.sine_and_cosine(at));
                 frame.shift(2, &d);

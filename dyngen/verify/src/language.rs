@@ -7,7 +7,8 @@ use crate::angles::Affine;
 use crate::point::Point;
 use dyngen_arm::exact::prime::{Draws, Fp};
 use dyngen_arm::exact::rational::{Rational, integer};
-use std::collections::{BTreeMap, HashMap};
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 
 /// An expression, and the line of the file where it stands.
@@ -169,10 +170,14 @@ pub(crate) struct Stop {
 /// Calls within calls beyond this are no generated code.
 const DEEPEST: usize = 16;
 
+/// The names of functions that were called.
+pub(crate) type Called = RefCell<BTreeSet<String>>;
+
 /// A file at a point.
 pub(crate) struct World<'a> {
     pub(crate) routines: &'a Routines,
     pub(crate) point: &'a Point<'a>,
+    pub(crate) called: &'a Called,
 }
 
 type Names<'e> = Vec<HashMap<&'e str, Value>>;
@@ -190,6 +195,7 @@ impl World<'_> {
         let Some(routine) = self.routines.get(name) else {
             return stop(format!("there is no function {name}"));
         };
+        self.called.borrow_mut().insert(name.to_string());
         if routine.parameters.len() != arguments.len() || depth > DEEPEST {
             return stop(format!("{name} cannot be called like this"));
         }

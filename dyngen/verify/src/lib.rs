@@ -70,6 +70,11 @@ fn structure_of(function: &str) -> String {
     format!("{function} structure")
 }
 
+/// Whether a constant of a file is a function's structure.
+fn is_structure(name: &str) -> bool {
+    name.ends_with(" structure")
+}
+
 /// What cannot be read, or is no generated file of the arm.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unreadable {

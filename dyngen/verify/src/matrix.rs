@@ -18,15 +18,15 @@ pub(crate) fn transposed(matrix: &[Fp], columns: usize) -> Vec<Fp> {
     (0..columns).flat_map(|j| matrix.iter().skip(j).step_by(columns).copied()).collect()
 }
 
-/// The inverse by Gauss and Jordan; zeros where it is singular, which no result equals.
-pub(crate) fn inverse(a: Vec<Fp>, n: usize) -> Vec<Fp> {
+/// The inverse by Gauss and Jordan; nothing where there is none.
+pub(crate) fn inverse(a: Vec<Fp>, n: usize) -> Option<Vec<Fp>> {
     let unit = |i: usize| (0..n).map(move |j| if i == j { Fp::ONE } else { Fp::ZERO });
     let mut rows: Vec<Vec<Fp>> =
         (0..n).map(|i| a[i * n..(i + 1) * n].iter().copied().chain(unit(i)).collect()).collect();
     if reduce(&mut rows, n).len() < n {
-        return vec![Fp::ZERO; n * n];
+        return None;
     }
-    rows.into_iter().flat_map(|row| row.into_iter().skip(n)).collect()
+    Some(rows.into_iter().flat_map(|row| row.into_iter().skip(n)).collect())
 }
 
 /// Brings rows into their reduced echelon form by the first `columns`; gives the columns of the pivots.
@@ -48,4 +48,18 @@ pub(crate) fn reduce(rows: &mut [Vec<Fp>], columns: usize) -> Vec<usize> {
         pivots.push(column);
     }
     pivots
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_singular_matrix_has_no_inverse() {
+        let matrix = |x: [i64; 4]| x.map(Fp::from_integer).to_vec();
+        assert_eq!(inverse(matrix([1, 2, 2, 4]), 2), None);
+        let regular = matrix([1, 2, 3, 4]);
+        let inverse = inverse(regular.clone(), 2);
+        assert_eq!(inverse.map(|x| times(&regular, &x, 2)), Some(matrix([1, 0, 0, 1])));
+    }
 }

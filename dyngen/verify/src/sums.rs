@@ -90,6 +90,9 @@ impl Reader<'_> {
         let mut base = self.atom()?;
         if self.takes("^") {
             let exponent = self.until(&['*', '/', '+', '-', ')', ' ']).parse().ok()?;
+            if base[1..].iter().any(|x| *x != Fp::ZERO) {
+                return None;
+            }
             base[0] = base[0].power(exponent);
         }
         Some(base)
@@ -108,8 +111,10 @@ impl Reader<'_> {
             let inner = self.sum()?;
             return self.takes(")").then_some(inner);
         }
+        let bodies = self.width / 11;
         let word = self.until(&['*', '/', '+', '-', ')', '^', ' ']);
         match Parameter::parse(word) {
+            Some(parameter) if parameter.link >= bodies => return None,
             Some(parameter) => *linear.get_mut(1 + parameter.index())? = Fp::ONE,
             None => linear[0] = residue(&parse_rational(word).ok()?),
         }

@@ -31,6 +31,18 @@ struct Batch {
     copied: &'static str,
     /// Angles that must not be large.
     angles: Vec<Expr>,
+    /// The arrays of the positions.
+    positions: Vec<String>,
+}
+
+/// The names that a pattern binds.
+fn bound(pattern: &Pattern) -> Vec<&str> {
+    match pattern {
+        Pattern::Ignored => Vec::new(),
+        Pattern::Name(name) => vec![name],
+        Pattern::List(patterns) => patterns.iter().flat_map(bound).collect(),
+        Pattern::AsPrepared(inner) => bound(inner),
+    }
 }
 
 fn text_of(code: &str) -> String {
@@ -65,7 +77,6 @@ impl Reader<'_> {
 
     fn batch_function(&mut self, f: &syn::ItemFn, share: Option<f64>) -> Checked<()> {
         let at = line(f);
-        super::rust::harmless(&f.attrs)?;
         let name = f.sig.ident.to_string();
         if dyngen_arm::Function::parse(&name).is_none()
             || plain(&f.sig.generics).replace(", > ", "> ") != SCALAR
@@ -90,7 +101,9 @@ impl Reader<'_> {
             cells: Vec::new(),
             copied: "",
             angles: Vec::new(),
+            positions: Vec::new(),
         };
+        self.lanes.clear();
         let mut loops = 0;
         for statement in &f.block.stmts {
             let at = line(statement);
@@ -119,9 +132,32 @@ impl Reader<'_> {
         let at = line(local);
         let Some(init) = &local.init else { return wrong(at, "a name without a value") };
         let found = pattern(&local.pat)?;
-        if plain(&init.expr) != "& mut * out " {
+        let is_result = plain(&init.expr) == "& mut * out ";
+        if !is_result {
             let value = self.expression(&init.expr)?;
-            batch.lets.push(Let { pattern: found, value });
+            let is_parameter = |name: &String| batch.parameters.contains(name);
+            let opens_parameters = match (&found, &value.kind) {
+                (Pattern::List(_), Kind::Name(name)) if is_parameter(name) => false,
+                (Pattern::Name(to), Kind::Prepared(of)) if to == "parameters" => {
+                    matches!(&of.kind, Kind::Name(name) if name == to)
+                }
+                _ => return wrong(at, "a value that dyngen does not name so"),
+            };
+            if matches!(&value.kind, Kind::Name(name) if name == "q") {
+                batch.positions = bound(&found).into_iter().map(str::to_string).collect();
+            }
+            batch.lets.push(Let { pattern: found.clone(), value });
+            if opens_parameters {
+                return Ok(());
+            }
+        }
+        // A name that stands for two arrays could be read as the wrong one.
+        for name in bound(&found) {
+            if batch.parameters.iter().any(|p| p == name) || !self.lanes.insert(name.to_string()) {
+                return wrong(at, &format!("{name} is bound twice"));
+            }
+        }
+        if !is_result {
             return Ok(());
         }
         let names = |patterns: &[Pattern]| {
@@ -160,11 +196,15 @@ impl Reader<'_> {
             let at = line(statement);
             match statement {
                 syn::Stmt::Local(local) if stored.is_empty() => {
-                    let let_ = self.of_lane(local)?;
-                    if let (Kind::SinCos(angle), Pattern::List(_)) = (&let_.value.kind, &let_.pattern) {
-                        batch.angles.push((**angle).clone());
-                    }
-                    lets.push(let_);
+                    lets.push(match angle_of(local) {
+                        Some(angle) => {
+                            let angle = self.expression(angle)?;
+                            batch.angles.push(angle.clone());
+                            let value = Expr { line: at, kind: Kind::SinCos(Box::new(angle)) };
+                            Let { pattern: self.lane_pattern(local)?, value }
+                        }
+                        None => self.of_lane(local)?,
+                    });
                 }
                 syn::Stmt::Expr(syn::Expr::Assign(assign), Some(_)) => {
                     let place = plain(&assign.left);
@@ -207,7 +247,9 @@ impl Reader<'_> {
         let small: Vec<&str> = names.split(" , ").collect();
         let fits =
             |angle: &Expr| share.and_then(|s| size(angle, &small, s * LIMIT)).is_some_and(|x| x <= LIMIT);
-        if condition != right || far.else_branch.is_some() || !batch.angles.iter().all(fits) {
+        let are_positions = small.iter().all(|name| batch.positions.iter().any(|of| of == name));
+        if condition != right || !are_positions || far.else_branch.is_some() || !batch.angles.iter().all(fits)
+        {
             return wrong(at, "a batch form that does not see whether its angles are large");
         }
         let [syn::Stmt::Expr(syn::Expr::ForLoop(each), None)] = &far.then_branch.stmts[..] else {
@@ -237,7 +279,16 @@ impl Reader<'_> {
         else {
             return wrong(at, "only 'let NAME = VALUE;' is read here");
         };
-        Ok(Let { pattern: pattern(&local.pat)?, value: self.expression(&init.expr)? })
+        Ok(Let { pattern: self.lane_pattern(local)?, value: self.expression(&init.expr)? })
+    }
+
+    /// The names of values of one sample, none of which may hide an array over the samples.
+    fn lane_pattern(&self, local: &syn::Local) -> Checked<Pattern> {
+        let found = pattern(&local.pat)?;
+        match bound(&found).into_iter().find(|name| self.lanes.contains(*name)) {
+            Some(name) => wrong(line(local), &format!("{name} is bound twice")),
+            None => Ok(found),
+        }
     }
 
     fn insert(&mut self, batch: &Batch, name: String, lets: Vec<Let>, result: Expr) -> Checked<()> {
@@ -248,6 +299,14 @@ impl Reader<'_> {
             Some(_) => wrong(batch.at, "a second function of this name"),
         }
     }
+}
+
+/// The angle of `let (s1, c1) = trigonometry::near(ANGLE);`
+fn angle_of(local: &syn::Local) -> Option<&syn::Expr> {
+    let init = local.init.as_ref().filter(|init| init.diverge.is_none() && local.attrs.is_empty())?;
+    let syn::Expr::Call(call) = &*init.expr else { return None };
+    let is_near = plain(&call.func) == "trigonometry :: near " && call.args.len() == 1;
+    call.args.first().filter(|_| is_near && matches!(local.pat, syn::Pat::Tuple(_)))
 }
 
 fn is_over_lanes(each: &syn::ExprForLoop) -> Checked<()> {

@@ -14,8 +14,8 @@ pub(crate) struct Dialect {
     pub(crate) number: (&'static str, &'static str),
 }
 
-/// Words, numbers, strings, lines of the preprocessor and single characters (`->` is one), each with its
-/// line.
+/// Words, numbers, strings, lines of the preprocessor and single characters (`->` and `//` are one), each
+/// with its line.
 fn tokens(text: &str, dialect: &Dialect) -> Vec<(usize, String)> {
     let (opens, closes) = dialect.comment;
     let (mut found, mut rest, mut line) = (Vec::new(), text, 1);
@@ -42,7 +42,8 @@ fn tokens(text: &str, dialect: &Dialect) -> Vec<(usize, String)> {
                 let ends = |(k, c): (usize, char)| !(word(c) || c == '-' && exponent(k));
                 rest.char_indices().position(ends).unwrap_or(rest.len())
             }
-            _ if rest.starts_with("->") => 2,
+            // In C89 no comment: what C99 leaves out behind it would be code.
+            _ if rest.starts_with("->") || rest.starts_with("//") => 2,
             other => other.len_utf8(),
         };
         let (token, after) = rest.split_at(length);
@@ -186,6 +187,10 @@ impl<'a> Cursor<'a> {
                 self.expect(")")?;
                 let negative = self.takes("-");
                 let digits = self.next();
+                // `010` is eight.
+                if !digits.contains(['.', 'e']) {
+                    return wrong(line, &format!("{digits} is no number that dyngen writes"));
+                }
                 let number = Expr { line, kind: self.literal(line, &digits)? };
                 if negative { Kind::Negative(Box::new(number)) } else { return Ok(number) }
             }

@@ -45,6 +45,12 @@ impl Head {
     }
 }
 
+/// Integers up to here are doubles, and no constant of an arm is larger.
+const EXACT_INTEGERS: f64 = 9_007_199_254_740_992.0;
+
+/// Digits that every double is printed with, or fewer.
+const MOST_DIGITS: usize = 17;
+
 /// What the constants of a file stand for where that is not what their digits say.
 #[derive(Debug, Default)]
 pub(crate) struct Literals(Vec<Meaning>);
@@ -80,9 +86,15 @@ impl Literals {
     }
 
     /// What a literal stands for at `place`, a function and a name in it; what its digits say where the head
-    /// says nothing.
+    /// says nothing. Nothing where they are none of a double: with a factor that is the prime a term would
+    /// vanish.
     pub(crate) fn exact(&self, digits: &str, place: &str) -> Option<Exact> {
         let value: f64 = digits.parse().ok()?;
+        let mantissa = digits.split('e').next()?.trim_start_matches(['0', '.']);
+        let count = mantissa.bytes().filter(u8::is_ascii_digit).count();
+        if value.abs() >= EXACT_INTEGERS || count > MOST_DIGITS || value == 0.0 && count > 0 {
+            return None;
+        }
         let of = || self.0.iter().filter(|m| m.literal == value);
         let here = of().find(|m| m.place.as_deref() == Some(place)).or(of().find(|m| m.place.is_none()));
         match here {

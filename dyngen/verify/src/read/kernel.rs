@@ -4,8 +4,8 @@ use crate::{Checked, Source, wrong};
 use dyngen_arm::Function;
 use dyngen_arm::function::{Argument, Size};
 
-/// More joints or parameters than this no arm has.
-const MOST: usize = 1000;
+/// More joints, angles or parameters than this no arm has.
+pub(super) const MOST: usize = 1000;
 
 /// A number of joints, parameters or angles, which a file must say before it is used.
 pub(crate) fn size(source: &Source, line: usize, name: &str) -> Checked<usize> {

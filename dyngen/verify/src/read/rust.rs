@@ -32,6 +32,8 @@ const AROUND: &str = "
 ";
 /// Sines and cosines, tested where they are written.
 const TRIGONOMETRY: &str = text::TRIGONOMETRY;
+/// The one condition among attributes, in the module of sines and cosines.
+const ALIGNED: &str = "cfg_attr ( target_arch = \"x86_64\" , repr ( align ( 16 ) ) ) ";
 /// The function that gives x·y + z.
 const FUSED: &str = "fused";
 
@@ -79,12 +81,17 @@ pub(crate) fn read(text: &str, literals: &Literals) -> Checked<Source> {
         Ok(file) => file,
         Err(e) => return wrong(e.span().start().line, &e.to_string()),
     };
+    let mut attributes = Attributes(Ok(()));
+    syn::visit::Visit::visit_file(&mut attributes, &file);
+    attributes.0?;
     let around = syn::parse_file(AROUND).map_or(Vec::new(), |file| file.items);
     let around = around.iter().map(plain).collect();
     let mut reader = Reader {
         literals,
         around,
         module: String::new(),
+        in_batch: false,
+        lanes: BTreeSet::new(),
         own: vec![names(&file.items)],
         place: String::new(),
         source: Source::default(),
@@ -107,6 +114,10 @@ pub(super) struct Reader<'a> {
     around: BTreeSet<String>,
     /// `name::` of the module that is read.
     pub(super) module: String,
+    /// Whether its functions are those over blocks of samples.
+    in_batch: bool,
+    /// The arrays over the samples of such a function, each of one number.
+    pub(super) lanes: BTreeSet<String>,
     /// The functions of the file and of that module.
     own: Vec<BTreeSet<String>>,
     /// Where literals stand: the function, then a space and the name in a `let`.
@@ -122,7 +133,6 @@ impl Reader<'_> {
     fn item(&mut self, item: &syn::Item) -> Checked<()> {
         match item {
             syn::Item::Fn(f) => {
-                harmless(&f.attrs)?;
                 let name = f.sig.ident.to_string();
                 if [FUSED, "sign"].contains(&name.as_str()) && self.around.contains(&plain(item)) {
                     return Ok(());
@@ -135,14 +145,12 @@ impl Reader<'_> {
                 self.function(&f.sig, &f.block, name)
             }
             syn::Item::Const(item) => {
-                harmless(&item.attrs)?;
                 if is_condition(item) {
                     return Ok(());
                 }
                 self.constant(item)
             }
             syn::Item::Impl(item) if plain(&item.self_ty) == "Trig < T > " && item.trait_.is_none() => {
-                harmless(&item.attrs)?;
                 if plain(&item.generics) != SCALAR {
                     return wrong(line(item), "another scalar than dyngen writes");
                 }
@@ -181,13 +189,14 @@ impl Reader<'_> {
                 let baked = self.source.constants.contains_key("PARAMETER_VALUES");
                 return as_written(items, &formatted_items(&text::discrete(baked)), &name);
             }
-            "tests" if item.attrs.first().is_some_and(|a| plain(&a.meta) == "cfg ( test ) ") => {}
+            "tests" if is_tests(item) => {}
             "batch" => {
-                harmless(&item.attrs)?;
-                return self.batch(items);
+                self.in_batch = true;
+                self.batch(items)?;
+                self.in_batch = false;
+                return Ok(());
             }
             _ if self.module.is_empty() => {
-                harmless(&item.attrs)?;
                 self.module = format!("{name}::");
                 self.own.push(names(items));
                 self.source.modules.push((name, line(item)));
@@ -328,7 +337,11 @@ impl Reader<'_> {
             syn::Expr::Struct(record) if record.path.is_ident("Trig") && record.rest.is_none() => {
                 let mut fields = Vec::new();
                 for field in &record.fields {
-                    fields.push((plain(&field.member).trim().to_string(), self.expression(&field.expr)?));
+                    let name = plain(&field.member).trim().to_string();
+                    if fields.iter().any(|(other, _)| *other == name) {
+                        return wrong(at, "a record with a field twice");
+                    }
+                    fields.push((name, self.expression(&field.expr)?));
                 }
                 Kind::Record(fields)
             }
@@ -345,7 +358,10 @@ impl Reader<'_> {
                 _ => return unknown(),
             },
             // One sample of a batch: its number among them is the same everywhere.
-            syn::Expr::Index(index) if plain(&index.index) == "lane " => return self.expression(&index.expr),
+            syn::Expr::Index(index) if plain(&index.index) == "lane " => match plain(&index.expr).trim() {
+                array if self.lanes.contains(array) => Kind::Name(array.to_string()),
+                _ => return wrong(at, "a sample of what is no array over the samples"),
+            },
             syn::Expr::Index(index) => match plain(&index.index).trim().parse() {
                 Ok(number) => Kind::Index(self.boxed(&index.expr)?, number),
                 Err(_) => return unknown(),
@@ -389,27 +405,33 @@ impl Reader<'_> {
             ("Prepared", 1) => Kind::AsPrepared(self.boxed(&arguments[0])?),
             ("trigonometry :: sin_cos", 2) => {
                 let of = vec![self.expression(&arguments[0])?];
-                let angles = Kind::Call(plain(&arguments[1]).trim().to_string(), of);
+                let angles = Kind::Call(self.called(at, plain(&arguments[1]).trim())?, of);
                 Kind::SinCos(Box::new(Expr { line: at, kind: angles }))
             }
-            ("trigonometry :: near", 1) => Kind::SinCos(Box::new(self.expression(&arguments[0])?)),
             ("sign", 1) => Kind::Free("sign", self.boxed(&arguments[0])?),
             (FUSED, 3) => match <[Expr; 3]>::try_from(self.expressions(arguments)?) {
                 Ok(of) => return Ok(Expr::fused(at, of).kind),
                 Err(_) => return wrong(at, "three numbers are expected here"),
             },
             ("Trig :: new", 1) => Kind::Call("Trig::new".to_string(), self.expressions(arguments)?),
-            (name, _) => {
-                // Of a batch form the function of one sample is that of the module around it.
-                let name = name.strip_prefix("super :: ").unwrap_or(name);
-                let inside = self.own.len() > 1 && self.own.last().is_some_and(|own| own.contains(name));
-                let name = if inside { format!("{}{name}", self.module) } else { name.to_string() };
-                if !inside && !self.own[0].contains(&name) {
-                    return wrong(at, &format!("a call of {name}, which dyngen does not write"));
-                }
-                Kind::Call(name, self.expressions(arguments)?)
-            }
+            (name, _) => Kind::Call(self.called(at, name)?, self.expressions(arguments)?),
         })
+    }
+
+    /// The function that a name stands for in the module that is read.
+    fn called(&self, at: usize, name: &str) -> Checked<String> {
+        // Of a batch form the function of one sample is that of the module around it.
+        let function = if self.in_batch { name.strip_prefix("super :: ") } else { Some(name) };
+        let has = |own: Option<&BTreeSet<String>>| {
+            own.zip(function).is_some_and(|(own, function)| own.contains(function))
+        };
+        match function {
+            Some(function) if self.own.len() > 1 && has(self.own.last()) => {
+                Ok(format!("{}{function}", self.module))
+            }
+            Some(function) if has(self.own.first()) => Ok(function.to_string()),
+            _ => wrong(at, &format!("a call of {name}, which dyngen does not write")),
+        }
     }
 
     /// A number as `0.5f64`.
@@ -465,12 +487,29 @@ fn is_condition(item: &syn::ItemConst) -> bool {
     item.ident == "_" && matches!(&*item.expr, syn::Expr::Macro(of) if asserts(of))
 }
 
-/// Attributes that change nothing of what is computed.
-pub(super) fn harmless(attributes: &[syn::Attribute]) -> Checked<()> {
-    let known = ["doc", "allow", "must_use", "inline", "derive"];
-    match attributes.iter().find(|a| !known.iter().any(|name| a.path().is_ident(name))) {
-        Some(other) => wrong(line(other), "an attribute that dyngen does not write"),
-        None => Ok(()),
+/// Whether a module is that of the arm's own tests, which is not looked into.
+fn is_tests(item: &syn::ItemMod) -> bool {
+    item.ident == "tests" && item.attrs.first().is_some_and(|a| plain(&a.meta) == "cfg ( test ) ")
+}
+
+/// Refuses attributes that may change what is computed, wherever they stand outside the arm's own tests.
+struct Attributes(Checked<()>);
+
+impl<'ast> syn::visit::Visit<'ast> for Attributes {
+    fn visit_attribute(&mut self, attribute: &'ast syn::Attribute) {
+        let known = ["doc", "allow", "must_use", "inline"].iter().any(|name| attribute.path().is_ident(name));
+        let text = plain(&attribute.meta);
+        let known =
+            known || ["derive ( Clone , Copy , Debug , PartialEq ) ", ALIGNED].contains(&text.as_str());
+        if !known && self.0.is_ok() {
+            self.0 = wrong(line(attribute), "an attribute that dyngen does not write");
+        }
+    }
+
+    fn visit_item_mod(&mut self, item: &'ast syn::ItemMod) {
+        if !is_tests(item) {
+            syn::visit::visit_item_mod(self, item);
+        }
     }
 }
 

@@ -7,7 +7,6 @@ use crate::language::{Expr, Kind, Let, Routine};
 use crate::{Checked, Source, wrong};
 use dyngen_arm::Function;
 use dyngen_arm::function::Argument;
-use std::collections::BTreeSet;
 
 /// Numbers have a suffix: `0.5f`.
 const DIALECT: Dialect = Dialect { comment: ("//", "\n"), field: ".", number: ("", "f") };
@@ -33,7 +32,6 @@ pub(crate) fn read(text: &str, literals: &Literals, frames: &[String]) -> Checke
         frames,
         prefix: String::new(),
         values: 0,
-        bound: BTreeSet::new(),
         source: Source::default(),
     };
     reader.text.fused = "fma";
@@ -58,8 +56,6 @@ struct Reader<'a> {
     prefix: String,
     /// How many values are prepared.
     values: usize,
-    /// Taken places of buffers.
-    bound: BTreeSet<usize>,
     source: Source,
 }
 
@@ -185,19 +181,25 @@ impl Reader<'_> {
         self.text.expect("}")
     }
 
-    /// A variable that is bound to a buffer: each at another place.
+    /// A variable that is bound to a buffer, at the place that is its argument's in every file.
     fn binding(&mut self, line: usize) -> Checked<()> {
         self.text.expect("group ( 0 ) @ binding (")?;
-        let place = self.text.next().parse();
-        let Some(place) = place.ok().filter(|place| self.bound.insert(*place)) else {
-            return wrong(line, "a place that another buffer has");
-        };
+        let place = self.text.next();
         self.text.expect(") var <")?;
         let access = self.text.until(">").join(" ");
         self.text.expect(">")?;
         let name = self.own_name()?;
+        let right = match (name.as_str(), argument(&name)) {
+            ("count", _) => 0,
+            (_, Some(argument)) => argument as usize + 1,
+            // The result, behind all arguments.
+            _ => Argument::Parameters as usize + 2,
+        };
+        if place != right.to_string() {
+            return wrong(line, "a buffer at another place than dyngen gives it");
+        }
         match (access.as_str(), name.as_str()) {
-            ("uniform", "count") if place == 0 => self.text.expect(": u32 ;"),
+            ("uniform", "count") => self.text.expect(": u32 ;"),
             ("storage , read_write", "result") => self.text.expect(": array < f32 > ;"),
             ("storage , read", "parameters") => {
                 self.text.expect(":")?;

@@ -5,6 +5,7 @@ mod cuda;
 use crate::language::{Exact, Expr, Kind, Let, Pattern, Routine};
 use crate::read::cursor::{Cursor, Dialect};
 use crate::read::head::Literals;
+use crate::read::kernel::MOST;
 use crate::{Checked, Source, wrong};
 use dyngen_arm::Function;
 use dyngen_arm::exact::rational::integer;
@@ -73,6 +74,11 @@ const DIALECT: Dialect = Dialect { comment: ("/*", "*/"), field: "->", number: (
 
 /// Reads a file in C, or in CUDA; `frames` are those of the arm.
 pub(crate) fn read(text: &str, is_cuda: bool, literals: &Literals, frames: &[String]) -> Checked<Source> {
+    // Lines that go on in the next one, and breaks that not every compiler takes for the end of a line.
+    let odd = |line: &str| line.trim_end().ends_with('\\') || line.contains("??/") || line.contains('\r');
+    if let Some(line) = text.lines().position(odd) {
+        return wrong(line + 1, "an end of a line that dyngen does not write");
+    }
     let mut reader = Reader {
         text: Cursor::new(text, &DIALECT, literals),
         is_cuda,
@@ -108,8 +114,8 @@ impl Reader<'_> {
     fn before(&mut self) -> Checked<()> {
         let line = self.text.line();
         let header = self.text.next();
-        let Some(header) = header.strip_prefix("#include \"").and_then(|text| text.strip_suffix(".h\""))
-        else {
+        let inside = header.strip_prefix("#include \"").and_then(|text| text.strip_suffix(".h\""));
+        let Some(header) = inside.filter(|name| !name.contains('"')) else {
             return wrong(line, "the file's header is to be included first");
         };
         self.source.not_checked.push(format!("{header}.h"));
@@ -186,18 +192,19 @@ impl Reader<'_> {
     }
 
     fn constant(&mut self, line: usize, name: String) -> Checked<()> {
-        while self.text.peek().is_some_and(|token| token != "{") {
-            self.text.next();
-        }
+        let length = if name == "JOINT_NAMES" { "JOINTS" } else { "PARAMETERS" };
+        self.text.expect(&format!("[ {}_{length} ] = {{", self.upper()))?;
         let mut entries = Vec::new();
-        while self.text.peek().is_some_and(|token| token != "}") {
-            self.text.next();
+        loop {
             let sign = if self.text.takes("-") { "-" } else { "" };
             let text = self.text.next();
             let inside = text.strip_prefix('"').and_then(|text| text.strip_suffix('"'));
             let plain =
                 inside.map(|text| text.replace("\\\"", "\"").replace("\\?", "?").replace("\\\\", "\\"));
             entries.push(plain.unwrap_or(format!("{sign}{text}")));
+            if !self.text.takes(",") {
+                break;
+            }
         }
         self.text.expect("} ;")?;
         self.source.constants.insert(name, (line, entries));
@@ -273,9 +280,10 @@ impl Reader<'_> {
                     read.push("parameters".to_string())
                 }
                 ["const", "real", name, "[", "JOINTS", "]"] => read.push(name.to_string()),
-                ["trig", "*", "trig"] if name == "Trig::new" => {}
-                ["prepared", "*", "prepared"] if name == "prepare" => {}
-                ["real", "result", ..] if text == result_of(name) => {}
+                // The place of the result is the last parameter.
+                ["trig", "*", "trig"] if name == "Trig::new" => break,
+                ["prepared", "*", "prepared"] if name == "prepare" => break,
+                ["real", "result", ..] if text == result_of(name) => break,
                 _ => return wrong(line, "a parameter that dyngen does not write"),
             }
             if !self.text.takes(",") {
@@ -388,11 +396,15 @@ impl Reader<'_> {
         self.text.expect("( & trig")?;
         let mut arguments = vec![body.trig(line)];
         while self.text.takes(",") {
-            self.text.takes("&");
+            let by_address = self.text.takes("&");
             let name = self.text.next();
-            if name != "result" {
-                arguments.push(Expr { line, kind: Kind::Name(name) });
+            if by_address != (name == "prepared") {
+                return wrong(line, "an argument that dyngen does not pass like this");
             }
+            if name == "result" {
+                break;
+            }
+            arguments.push(Expr { line, kind: Kind::Name(name) });
         }
         body.called = Some(Expr { line, kind: Kind::Call(name, arguments) });
         self.text.expect(") ;")
@@ -411,6 +423,9 @@ impl Reader<'_> {
             return wrong(line, "another place than dyngen fills here");
         }
         let index = self.text.index()?;
+        if index > MOST {
+            return wrong(line, "a place behind those of every arm");
+        }
         let name = format!("trig.{field}[{index}]");
         match body.slots.insert((field, index), name.clone()) {
             None => Ok(Pattern::Name(name)),
@@ -431,14 +446,18 @@ struct Body {
 }
 
 impl Body {
-    /// The struct of sines and cosines; what is not filled is zero, which no proof takes for anything else.
+    /// The struct of sines and cosines; what is not filled is as good as free, so that no proof takes it for
+    /// anything else.
     fn trig(&self, line: usize) -> Expr {
-        let list = |field: &str| {
+        let list = |field: &'static str| {
             let of = || self.slots.iter().filter(|((f, _), _)| f == field);
             let length = of().map(|((_, index), _)| index + 1).max().unwrap_or(0);
             let entry = |k: usize| match of().find(|((_, index), _)| *index == k) {
                 Some((_, name)) => Kind::Name(name.clone()),
-                None => Kind::Number(Exact::Number(integer(0), Zero::zero())),
+                None => {
+                    let number = Kind::Number(Exact::Number(integer(k as i64), Zero::zero()));
+                    Kind::Free(field, Box::new(Expr { line, kind: number }))
+                }
             };
             let entries = (0..length).map(|k| Expr { line, kind: entry(k) }).collect();
             (field.to_string(), Expr { line, kind: Kind::List(entries) })
