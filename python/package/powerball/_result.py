@@ -41,6 +41,22 @@ def numbers(values: Sequence[Optional[float]]) -> Array:
     return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
 
 
+def evidence(entry: Dict[str, Any]) -> Dict[str, Any]:
+    """What every named effect has, of torques or of positions."""
+    return {
+        "effect": entry["effect"],
+        "joints": list(entry["joints"]),
+        "parameters": entry["parameters"],
+        "rms_before": numbers(entry["rms_before"]),
+        "rms_after": numbers(entry["rms_after"]),
+        "p_value": entry["p_value"],
+        "probability": entry["probability"],
+        "logs": entry.get("logs", []),
+        "leftover": entry["leftover"],
+        "rivals": [(rival["effect"], rival["why_not"]) for rival in entry["rivals"]],
+    }
+
+
 class Result:
     """A result: attributes for what is asked most, ``to_dict()`` for all of it."""
 

@@ -11,7 +11,7 @@ from ._arrays import Array, Values
 from ._logs import Logs, given
 from ._model import Model, optional_model
 from ._progress import Progress, listener
-from ._result import OfLogs, Spread, figures, joints_in_words, numbers, paragraph, spread, table
+from ._result import OfLogs, Spread, evidence, figures, joints_in_words, numbers, paragraph, spread, table
 from .arm import Arm
 from .identification import Map, said
 from .rule import Rule, rule_text
@@ -136,20 +136,8 @@ class Explained(OfLogs):
         """Named effects in the order in which they were added; empty where the model lacks nothing."""
 
         def of(entry: Dict[str, Any]) -> Effect:
-            return Effect(
-                effect=entry["effect"],
-                joints=list(entry["joints"]),
-                parameters=entry["parameters"],
-                rms_before=numbers(entry["rms_before"]),
-                rms_after=numbers(entry["rms_after"]),
-                p_value=entry["p_value"],
-                probability=entry["probability"],
-                margin=entry["margin"],
-                leftover=entry["leftover"],
-                logs=entry.get("logs", []),
-                relative_std=entry["relative_std"],
-                rivals=[(rival["effect"], rival["why_not"]) for rival in entry["rivals"]],
-            )
+            more = {key: entry[key] for key in ("margin", "relative_std")}
+            return Effect(**evidence(entry), **more)
 
         return [of(entry) for entry in self._json["effects"]]
 

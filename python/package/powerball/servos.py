@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Dict, List, Optional, Tuple
 
 from ._arrays import Array, Values, named
-from ._result import Judged, figures, joints_in_words, numbers, paragraph, table
+from ._result import Judged, evidence, figures, joints_in_words, numbers, paragraph, table
 
 
 def masses(values: Optional[Values]) -> Optional[Tuple[Optional[str], Dict[str, float]]]:
@@ -201,22 +201,7 @@ class ExplainedServos(Judged):
     @property
     def effects(self) -> List[ServoEffect]:
         """Named effects in the order in which they were found; empty where the model lacks nothing."""
-
-        def of(entry: Dict[str, Any]) -> ServoEffect:
-            return ServoEffect(
-                effect=entry["effect"],
-                joints=list(entry["joints"]),
-                parameters=entry["parameters"],
-                rms_before=numbers(entry["rms_before"]),
-                rms_after=numbers(entry["rms_after"]),
-                p_value=entry["p_value"],
-                probability=entry["probability"],
-                logs=entry.get("logs", []),
-                leftover=entry["leftover"],
-                rivals=[(rival["effect"], rival["why_not"]) for rival in entry["rivals"]],
-            )
-
-        return [of(entry) for entry in self._json["effects"]]
+        return [ServoEffect(**evidence(entry)) for entry in self._json["effects"]]
 
     @property
     def logs(self) -> List[Dict[str, Any]]:
