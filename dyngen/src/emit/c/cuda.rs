@@ -7,6 +7,7 @@ use crate::dynamics::function::Argument;
 use crate::emit::statement::{is_matrix, is_number};
 use crate::emit::{Options, Parts, docs, fused, rounded};
 use crate::model::{Error, Model};
+use dyngen_verify::text::BEFORE_CUDA;
 
 /// A generated file in CUDA. Compiled without contraction its results are those of the file in C to the bit.
 ///
@@ -18,7 +19,7 @@ pub fn cuda_source(model: &Model, options: &Options) -> Result<String, Error> {
     let items = items(&names, model, options, &parts, Some(kernel));
     let items: Vec<String> = items.iter().map(text).collect();
     Ok(format!(
-        "{}{BEFORE}
+        "{}{BEFORE_CUDA}
 /** The numbers: double, or float where {}_FLOAT is defined (as by -D{}_FLOAT). */
 {}
 typedef {}_real real;
@@ -33,24 +34,6 @@ typedef {}_real real;
         items.join("\n")
     ))
 }
-
-/// What compilers must bring. NVRTC has no headers.
-const BEFORE: &str = r#"#ifdef __CUDACC_RTC__
-typedef unsigned int uint32_t;
-typedef unsigned long long uint64_t;
-#else
-#include <math.h>
-#include <stddef.h>
-#include <stdint.h>
-#endif
-
-#if defined(__FAST_MATH__) || (defined(__USE_FAST_MATH__) && (__USE_FAST_MATH__ + 0))
-#error "sums must be rounded as they are written: compile without --use_fast_math"
-#endif
-#ifdef __clang__
-#pragma STDC FP_CONTRACT OFF
-#endif
-"#;
 
 /// The comment at the head; `rounded` are the lines of constants.
 fn head(names: &Names, model: &Model, options: &Options, rounded: &[String]) -> String {

@@ -1,5 +1,6 @@
 //! The texts that are the same in every generated file and are compared, not proven: sines and cosines,
-//! tested with integers, and the module `discrete`. The generator prints them from here.
+//! tested with integers, the module `discrete`, and the head of a file in CUDA. The generator prints them
+//! from here.
 
 #[cfg(test)]
 mod accuracy;
@@ -12,9 +13,26 @@ pub const TRIGONOMETRY: &str = include_str!("trigonometry.rs");
 pub const TRIGONOMETRY_C: &str = include_str!("trigonometry.c");
 /// Sines and cosines in WGSL.
 pub const TRIGONOMETRY_WGSL: &str = include_str!("trigonometry.wgsl");
+/// What stands before the code of a file in CUDA: what compilers must bring, as NVRTC has no headers.
+pub const BEFORE_CUDA: &str = r#"#ifdef __CUDACC_RTC__
+typedef unsigned int uint32_t;
+typedef unsigned long long uint64_t;
+#else
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+#endif
+
+#if defined(__FAST_MATH__) || (defined(__USE_FAST_MATH__) && (__USE_FAST_MATH__ + 0))
+#error "sums must be rounded as they are written: compile without --use_fast_math"
+#endif
+#ifdef __clang__
+#pragma STDC FP_CONTRACT OFF
+#endif
+"#;
 /// A step of time: the module of an arm whose parameters are passed.
 pub const DISCRETE: &str = include_str!("discrete.rs");
-/// The same where values are baked in: functions take no parameters.
+/// The module `discrete`; where values are baked in, its functions take no parameters.
 #[must_use]
 pub fn discrete(baked: bool) -> String {
     match baked {

@@ -2,26 +2,9 @@
 
 use super::super::kernel::Kernel;
 use super::{OTHER, Reader, TRIGONOMETRY};
+use crate::text::BEFORE_CUDA;
 use crate::{Checked, wrong};
 use dyngen_arm::Function;
-
-/// What stands before the type of the numbers.
-const BEFORE: &str = r#"
-#ifdef __CUDACC_RTC__
-typedef unsigned int uint32_t;
-typedef unsigned long long uint64_t;
-#else
-#include <math.h>
-#include <stddef.h>
-#include <stdint.h>
-#endif
-#if defined(__FAST_MATH__) || (defined(__USE_FAST_MATH__) && (__USE_FAST_MATH__ + 0))
-#error "sums must be rounded as they are written: compile without --use_fast_math"
-#endif
-#ifdef __clang__
-#pragma STDC FP_CONTRACT OFF
-#endif
-"#;
 
 /// The type of the numbers, with the arm's name for NAME and name.
 const NUMBERS: &str = "
@@ -35,7 +18,7 @@ typedef name_real real;
 
 impl Reader<'_> {
     pub(crate) fn before_cuda(&mut self) -> Checked<()> {
-        self.text.text(BEFORE, OTHER)?;
+        self.text.text(BEFORE_CUDA, OTHER)?;
         let line = self.text.line();
         let upper = self.text.peek().and_then(|line| line.strip_prefix("#ifdef ")?.strip_suffix("_FLOAT"));
         let Some(upper) = upper.map(str::to_string) else { return wrong(line, OTHER) };
