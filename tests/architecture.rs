@@ -262,3 +262,39 @@ fn paths_are_read_as_the_compiler_reads_them() {
     let found: Vec<String> = paths(code, "crate").iter().map(|p| p.join("::")).collect();
     assert_eq!(found, ["a::self", "a::b::C", "a::b::d", "a::e", "g::h", "y"]);
 }
+
+/// Files of the runtime that compare something with chance by themselves: each is a judge of its own. Whoever
+/// asks whether columns explain rows calls `powerball/identification/src/evidence/`, and adds none here.
+const JUDGES: [&str; 13] = [
+    "powerball/commands/src/procedure/settling.rs",
+    "powerball/explanation/src/experiment/decide.rs",
+    "powerball/explanation/src/explain/above_band.rs",
+    "powerball/explanation/src/explain/comparison/withhold.rs",
+    "powerball/explanation/src/explain/results/conclude.rs",
+    "powerball/explanation/src/explain/search/evidence.rs",
+    "powerball/explanation/src/servo/by_log.rs",
+    "powerball/explanation/src/servo/candidates.rs",
+    "powerball/explanation/src/servo/mod.rs",
+    "powerball/identification/src/comparison/cause.rs",
+    "powerball/identification/src/comparison/differences.rs",
+    "powerball/identification/src/comparison/strokes.rs",
+    "powerball/identification/src/transmission/search.rs",
+];
+
+#[test]
+fn no_further_file_compares_with_chance_by_itself() {
+    let words = ["f_tail", "t_critical", "t_quantile_975", "p_of_sum", "p_of_coefficients"];
+    let mut found = BTreeSet::new();
+    for folder in ["controller", "bus", "logs", "identification", "explanation", "commands"] {
+        for file in sources(&root().join("powerball").join(folder).join("src")) {
+            let name = file.strip_prefix(root()).unwrap().to_string_lossy().into_owned();
+            let is_shared = ["/evidence/", "/estimate/", "/tests/"].iter().any(|room| name.contains(room));
+            let text = fs::read_to_string(&file).unwrap();
+            let mut names = text.split(|c: char| !c.is_alphanumeric() && c != '_');
+            if !is_shared && !name.ends_with("tests.rs") && names.any(|name| words.contains(&name)) {
+                found.insert(name);
+            }
+        }
+    }
+    assert_eq!(found, JUDGES.map(String::from).into(), "ask powerball_identification::evidence instead");
+}
