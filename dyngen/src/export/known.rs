@@ -43,8 +43,8 @@ impl Known {
     /// Reads a values file and, if there is one, a file with friction and effects, by their texts and names.
     ///
     /// # Errors
-    /// Missing values of the files: each link and each bar needs all its parameters, and they must be possible
-    /// for a body.
+    /// Missing values of the files: each link and each bar needs all its parameters, and they must be those
+    /// of a body.
     pub fn read(arm: &Arm, values: (&str, &str), friction: Option<(&str, &str)>) -> Result<Known, String> {
         let (text, file) = values;
         // Text that is not JSON, and keys that stand twice, are reported as for any values file.

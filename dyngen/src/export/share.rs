@@ -29,6 +29,9 @@ pub(super) struct Share {
 pub(super) fn chain(robot: &Robot, arm: &Arm, options: &Options) -> Result<Chain, Vec<String>> {
     let options = by_the_letter(robot, arm, options);
     let mut chain = chain::chain(robot, &options)?;
+    if arm.bars.is_empty() {
+        chain.loops.clear();
+    }
     // With numbers that are rounded a loop may not close.
     if chain.bars().count() < arm.bars.len() {
         chain.loops = chain::chain(&rounding::nearest(robot, &chain.read).0, &options)?.loops;
@@ -62,7 +65,8 @@ pub(super) fn shares(
     same_arm(arm, chain)?;
     let (mut frames, _) = frames(arm);
     let base = placed(&arm.base);
-    let of_bars: Vec<Pose> = arm.bars.iter().map(|bar| Pose::of_bar(bar, &base, &frames)).collect();
+    let bars = chain.bars().zip(&arm.bars);
+    let of_bars: Vec<Pose> = bars.map(|((_, bar), own)| bar.frame(own, &base, &frames)).collect();
     same_bars(arm, chain, &of_bars)?;
     frames.extend(of_bars);
     let links = chain.joints.iter().map(|joint| Rigid {

@@ -5,6 +5,8 @@ use super::chain::{ChainJoint, Mass, held, masses};
 use super::pose::Pose;
 use super::tree::Tree;
 use super::urdf::{Connect, Mimic};
+use crate::arm::Bar;
+use crate::exact::rational;
 use nalgebra::Vector3;
 
 /// Points and directions nearer than this are the same, m or as a sine.
@@ -37,6 +39,15 @@ pub(crate) struct ChainBar {
     pub(crate) links: Vec<String>,
     pub(crate) poses: Vec<Pose>,
     pub(crate) masses: Vec<Mass>,
+}
+
+impl ChainBar {
+    /// The frame of this bar in an arm, whose base and links have these frames at q = 0.
+    pub(crate) fn frame(&self, in_arm: &Bar, base: &Pose, links: &[Pose]) -> Pose {
+        let frame = |link: Option<usize>| link.map_or(base, |link| &links[link]);
+        let pin = Vector3::from(in_arm.pin.each_ref().map(rational::to_f64));
+        Pose { rotation: frame(in_arm.parallel).rotation, origin: frame(in_arm.carrier).point(pin) }
+    }
 }
 
 /// A loop's joint: what it joins, by the joints that move them, and where it is.

@@ -1,7 +1,5 @@
 //! Poses, and angles that are meant to be exact.
 
-use crate::arm::Bar;
-use crate::exact::rational::to_f64;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -29,13 +27,6 @@ impl Pose {
     /// From an axis z, a direction x at right angles to it, and an origin.
     pub(crate) fn from_axes(z: Vector3<f64>, x: Vector3<f64>, origin: Vector3<f64>) -> Self {
         Pose { rotation: Matrix3::from_columns(&[x, z.cross(&x), z]), origin }
-    }
-
-    /// The frame of a bar where the links' frames are these, and the base's.
-    pub(crate) fn of_bar(bar: &Bar, base: &Pose, links: &[Pose]) -> Self {
-        let frame = |link: Option<usize>| link.map_or(base, |link| &links[link]);
-        let pin = Vector3::from(bar.pin.each_ref().map(to_f64));
-        Pose { rotation: frame(bar.parallel).rotation, origin: frame(bar.carrier).point(pin) }
     }
 
     /// `self` is given in a frame, `next` in `self`.

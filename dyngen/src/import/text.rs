@@ -214,7 +214,7 @@ pub(super) fn values(chain: &Chain, frames: &Frames, arm: &Arm) -> Vec<(Paramete
     let links = chain.joints.iter().zip(&frames.links).enumerate();
     let bars = chain.bars().zip(&arm.bars).zip(arm.links()..);
     let of_bars = bars.flat_map(|(((_, bar), of), link)| {
-        let values = link_values(&bar.masses, &Pose::of_bar(of, &frames.base, &frames.links));
+        let values = link_values(&bar.masses, &bar.frame(of, &frames.base, &frames.links));
         ParameterKind::ALL.into_iter().zip(values).map(move |(kind, value)| (Parameter { link, kind }, value))
     });
     links
