@@ -2,8 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use dyngen::import::{self, Imported, Options};
-use dyngen::{Evaluator, Function, Model, SetKind};
+use chacha20::ChaCha8Rng;
+use dyngen::arm::Parameter;
+use dyngen::export;
+use dyngen::import::{self, Imported, Options, Source};
+use dyngen::{Arm, Evaluator, Function, Model, SetKind};
+use rand::{RngExt, SeedableRng};
 
 const CRANK: &str = include_str!("mjcf/crank.xml");
 const LEVEL: &str = include_str!("mjcf/level.xml");
@@ -130,4 +134,77 @@ fn loops_that_an_arm_file_has_not_are_left_out_with_a_reason() {
     let text = CRANK.replacen("body1=\"rod\"", "body1=\"rot\"", 1);
     let error = import::any(&text, "arm.xml", &Options::default()).unwrap_err().to_string();
     assert!(error.contains("line 35: <connect>: there is no body 'rot'"), "{error}");
+}
+
+/// The values with those of each body times a factor of its own.
+fn scaled(values: &[(Parameter, f64)]) -> Vec<(Parameter, f64)> {
+    values.iter().map(|(p, value)| (*p, value * (1.5 + 0.25 * p.link as f64))).collect()
+}
+
+/// The model with these values, and with friction at every coordinate.
+fn exported(text: &str, arm: &Arm, values: Vec<(Parameter, f64)>) -> Result<String, String> {
+    let names: Vec<String> = values.iter().map(|(p, value)| format!("\"{p}\": {value:?}")).collect();
+    let joint = |j| format!("{{\"joint\": {j}, \"gamma1\": 2, \"gamma3\": 0.5, \"gamma5\": 1.5}}");
+    let friction: Vec<String> = (1..=arm.dof()).map(joint).collect();
+    let friction = format!("{{\"friction\": [{}]}}", friction.join(", "));
+    let values = format!("{{{}}}", names.join(", "));
+    let known = export::Known::read(arm, (&values, "v.json"), Some((&friction, "f.json")))?;
+    let new = export::source(&Source::of_text(text, "arm.xml"), arm, &known, &Options::default());
+    new.map(|new| new.text).map_err(|e| e.to_string())
+}
+
+/// Torques of an arm at random states.
+fn torques(Imported { arm, .. }: &Imported, values: &[(Parameter, f64)]) -> Vec<f64> {
+    let model = Model::derive(arm.clone()).unwrap();
+    let values: Vec<f64> = values.iter().map(|(_, value)| *value).collect();
+    let torque = Evaluator::new(&model, Function::InverseDynamics, SetKind::Full).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let mut all = Vec::new();
+    for _ in 0..20 {
+        let [q, dq, ddq] =
+            [(); 3].map(|()| (0..arm.dof()).map(|_| rng.random_range(-2.0..2.0)).collect::<Vec<f64>>());
+        let mut tau = vec![0.0; arm.dof()];
+        torque.evaluate(&q, &dq, &ddq, &values, &mut tau);
+        all.extend(tau);
+    }
+    all
+}
+
+#[test]
+fn values_of_bars_are_written_and_read_again() {
+    let upright = "<body name=\"stay\" pos=\"0.5 0.03 0.15\">\n        <joint name=\"foot\" axis=\"0 1 0\"/>";
+    let turned = "<body name=\"stay\" pos=\"0.5 0.03 0.15\" euler=\"-1.5708 0 0\">\n        <joint name=\"foot\" \
+                  axis=\"0 0 1\" damping=\"3\"/>";
+    let rounded = LEVEL.replacen(upright, turned, 1).replacen("pos=\"0 0 1.1\"/>", "pos=\"0 -1.1 0\"/>", 1);
+    for text in [CRANK, LEVEL, &rounded] {
+        let before = imported(text, "hand");
+        let values = scaled(&before.values);
+        let new = exported(text, &before.arm, values.clone()).unwrap();
+        let after = imported(&new, "hand");
+        assert_eq!(after.arm, before.arm);
+        let (given, found) = (torques(&before, &values), torques(&after, &after.values));
+        for (given, found) in given.iter().zip(&found) {
+            assert!((given - found).abs() < 1e-9 * given.abs().max(1.0), "{given} {found}");
+        }
+        // The friction of a loop is at its joint of the chain alone.
+        let count = |damping: &str| new.matches(&format!("damping=\"{damping}\"")).count();
+        assert_eq!([count("1.5"), count("0")], [before.arm.dof(), before.arm.bars.len()], "{new}");
+    }
+}
+
+#[test]
+fn bars_without_a_place_are_refused() {
+    let before = imported(CRANK, "hand");
+    let refusal = |text: &str| exported(text, &before.arm, before.values.clone()).unwrap_err();
+    let open =
+        CRANK.replacen("<connect name=\"tail\" body1=\"rod\" body2=\"forearm\" anchor=\"0 0 1.1\"/>", "", 1);
+    let words = "of the bars of closed loops that the arm has ('rod', 'crank'), none are here";
+    assert!(refusal(&open).contains(words), "{}", refusal(&open));
+    let longer = CRANK.replacen("pos=\"-0.25 0.05 0\"", "pos=\"-0.35 0.05 0\"", 1);
+    assert!(refusal(&longer).contains("bar 'rod': its pin lies 100.000 mm from"), "{}", refusal(&longer));
+    let known = export::Known::read(&before.arm, (&before.values_json(), "v.json"), None).unwrap();
+    for write in [export::sdf, export::usd] {
+        let refusal = write(&before.arm, &known, "a test", &[]).unwrap_err();
+        assert!(refusal.contains("'rod', 'crank'") && refusal.contains("--to mjcf"), "{refusal}");
+    }
 }

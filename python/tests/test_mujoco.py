@@ -64,3 +64,57 @@ def test_the_arm_has_mujocos_dynamics():
         columns = example.torques(model, q, rest, unit) - gravity
         np.testing.assert_allclose(arm.mass_matrix(q[0], values), columns.T, atol=1e-9)
         np.testing.assert_allclose(arm.gravity(q, values), gravity, atol=1e-9)
+
+
+def constraint(model, data):
+    """What a connect leaves open, m, with its Jacobian and that one's rate."""
+    ends = []
+    for k, one in enumerate((model.eq_obj1id[0], model.eq_obj2id[0])):
+        if model.eq_objtype[0] == mujoco.mjtObj.mjOBJ_SITE:
+            body, point = model.site_bodyid[one], data.site_xpos[one]
+        else:
+            anchor = model.eq_data[0, 3 * k : 3 * k + 3]
+            body, point = one, data.xpos[one] + data.xmat[one].reshape(3, 3) @ anchor
+        rows, rates = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+        mujoco.mj_jac(model, data, rows, None, point, body)
+        mujoco.mj_jacDot(model, data, rates, None, point, body)
+        ends.append([point, rows, rates])
+    return [first - second for first, second in zip(*ends)]
+
+
+def constrained_torques(model, free, q, dq, ddq):
+    """Torques of the joints that move on their own, by d'Alembert: Gᵀ(M q̈ + h), where J G = 0."""
+    data = mujoco.MjData(model)
+    tied = [j for j in range(model.nv) if j not in free]
+    data.qpos[free] = q
+    for _ in range(20):
+        mujoco.mj_forward(model, data)
+        gap, rows, _ = constraint(model, data)
+        data.qpos[tied] -= np.linalg.pinv(rows[:, tied], rcond=1e-9) @ gap
+    assert np.abs(gap).max() < 1e-12
+    follow = np.linalg.pinv(rows[:, tied], rcond=1e-9)
+    moves = np.zeros((model.nv, len(free)))
+    moves[free] = np.eye(len(free))
+    moves[tied] = -follow @ rows[:, free]
+    data.qvel[:] = moves @ dq
+    mujoco.mj_forward(model, data)
+    acceleration = moves @ ddq
+    acceleration[tied] -= follow @ (constraint(model, data)[2] @ data.qvel)
+    inertia = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, inertia)
+    return moves.T @ (inertia @ acceleration + data.qfrc_bias)
+
+
+@pytest.mark.parametrize("name", ["crank", "level"])
+def test_bars_of_a_closed_loop_are_exported(name, tmp_path):
+    arm = pb.Arm.from_mjcf(ROOT / f"dyngen/tests/mjcf/{name}.xml", tip="hand")
+    # Each body by a factor of its own, bars too.
+    values = {key: value * (1 + int(key.lstrip("mxyzI")) / 4) for key, value in arm.values.items()}
+    pb.export(arm, values, output=tmp_path / "new.xml")
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "new.xml"))
+    free = [model.joint(joint).dofadr[0] for joint in arm.joint_names]
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        q, dq, ddq = rng.uniform(-0.5, 0.5, (3, arm.dof))
+        ours = arm.inverse_dynamics(q, dq, ddq, values)
+        np.testing.assert_allclose(ours, constrained_torques(model, free, q, dq, ddq), rtol=1e-9, atol=1e-9)

@@ -26,9 +26,10 @@ pub struct Friction {
 /// The values to write into a robot description.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known {
-    /// Eleven parameters a link in the order of [`Arm::all_parameters`].
+    /// Eleven parameters a body in the order of [`Arm::all_parameters`].
     pub values: Vec<f64>,
-    /// For each link what is known of its parameters, in words: sums with values and standard errors.
+    /// For each link, then each bar, what is known of its parameters, in words: sums with values and standard
+    /// errors.
     pub words: Vec<Vec<String>>,
     /// By joint; `None` for joints that follow others, whose friction acts at the joint that they follow.
     pub friction: Option<Vec<Option<Friction>>>,
@@ -42,9 +43,9 @@ impl Known {
     /// Reads a values file and, if there is one, a file with friction and effects, by their texts and names.
     ///
     /// # Errors
-    /// Missing values of the files: each link needs all its parameters, and they must be possible for a body.
+    /// Missing values of the files: each link and each bar needs all its parameters, and they must be those
+    /// of a body.
     pub fn read(arm: &Arm, values: (&str, &str), friction: Option<(&str, &str)>) -> Result<Known, String> {
-        arm.without_bars("the export")?;
         let (text, file) = values;
         // Text that is not JSON, and keys that stand twice, are reported as for any values file.
         let json: Value = serde_json::from_str(text).map_err(|e| format!("{file}: not valid JSON: {e}"))?;
@@ -72,15 +73,15 @@ impl Known {
         if !missing.is_empty() {
             return Err(format!("{file}: no value for {}", missing.join(", ")));
         }
-        for link in 0..arm.links() {
-            let ten: [f64; 10] = std::array::from_fn(|k| all[11 * link + k]);
+        for body in 0..arm.bodies() {
+            let ten: [f64; 10] = std::array::from_fn(|k| all[11 * body + k]);
             let scale = ten.iter().fold(0.0f64, |m, x| m.max(x.abs()));
             let least = pseudo_inertia(&ten).symmetric_eigenvalues().min();
             if least < -ROUNDING * scale {
                 return Err(format!(
-                    "{file}: link {}: no body has these parameters (its pseudo-inertia has the eigenvalue \
+                    "{file}: {}: no body has these parameters (its pseudo-inertia has the eigenvalue \
                      {least:.3e}): `dyngen check` says why",
-                    link + 1
+                    arm.body_name(body)
                 ));
             }
         }
@@ -124,22 +125,22 @@ impl Known {
 }
 
 fn is_of(arm: &Arm, name: &str) -> bool {
-    Parameter::parse(name).is_some_and(|p| p.link < arm.links())
+    Parameter::parse(name).is_some_and(|p| p.link < arm.bodies())
 }
 
-/// The sums that an identification lists, with their errors, at each link whose parameters they hold.
+/// The sums that an identification lists, with their errors, at each body whose parameters they hold.
 fn words(arm: &Arm, json: &Value) -> Vec<Vec<String>> {
-    let mut words = vec![Vec::new(); arm.links()];
+    let mut words = vec![Vec::new(); arm.bodies()];
     for entry in json.get("parameters").and_then(Value::as_array).into_iter().flatten() {
         let (Some(name), Some(value)) = (entry["name"].as_str(), entry["value"].as_f64()) else { continue };
-        let links = match parse_sum(name) {
+        let body = match parse_sum(name) {
             // The sum's first term is its own; others only add to it.
-            Ok(terms) => terms.first().map(|(p, _)| p.link).filter(|link| *link < arm.links()),
+            Ok(terms) => terms.first().map(|(p, _)| p.link).filter(|body| *body < arm.bodies()),
             Err(_) => None,
         };
-        if let Some(link) = links {
+        if let Some(body) = body {
             let std = entry["std"].as_f64().map_or("not determined".to_string(), |s| format!("± {s:.3e}"));
-            words[link].push(format!("{name} = {value:.6e} {std}"));
+            words[body].push(format!("{name} = {value:.6e} {std}"));
         }
     }
     words

@@ -11,7 +11,7 @@ use super::term::Term;
 use super::urdf::Exported;
 use crate::arm::{Arm, Joint, JointKind};
 use crate::exact::rational::{Rational, to_f64};
-use crate::import::chain::{self, ChainJoint};
+use crate::import::chain::ChainJoint;
 use crate::import::mjcf::{angles_are_radians, read};
 use crate::import::urdf::Robot;
 use crate::import::{ImportError, Options};
@@ -33,8 +33,7 @@ pub fn mjcf(
     let unreadable =
         |e: String| ImportError::Unreadable(format!("{file}: cannot be read as a MuJoCo model: {e}"));
     let robot = read(text).map_err(unreadable)?;
-    let options = share::options(&robot, arm, options);
-    let chain = chain::chain(&robot, &options).map_err(refused)?;
+    let chain = share::chain(&robot, arm, options).map_err(refused)?;
     let document = Document::parse(text).map_err(|e| unreadable(e.to_string()))?;
     let degrees = !angles_are_radians(&document);
     let mut writer = Writer { text, robot: &robot, document: &document, degrees, edits: Edits::default() };
@@ -44,8 +43,8 @@ pub fn mjcf(
     for (i, share) in shares.into_iter().enumerate() {
         writer.inertials(&share, &known.words[i]);
         notes.extend(share.note);
+        let Some(joint) = chain.joints.get(i) else { continue };
         let (held, effects) = held(arm, known, i);
-        let joint = &chain.joints[i];
         let turns = match arm.coupled_motor(i) {
             None => {
                 writer.joint(joint, &arm.joints[i], &held);
@@ -75,6 +74,14 @@ pub fn mjcf(
             writer.servo(&joint.name, servo, &mut actuators.servos);
         }
         actuators.add(&joint.name, &turns, effects);
+    }
+    for closed in &chain.loops {
+        let follows = arm.joints[closed.first].mimic.is_some();
+        let (of_chain, _) = held(arm, known, if follows { closed.last } else { closed.first });
+        // What was identified is that of the whole loop, and stands at its joint of the chain.
+        for pin in &closed.pins {
+            writer.pin(pin, &of_chain.moved_away());
+        }
     }
     notes.extend(actuators.left_out.iter().map(|what| format!("left out: {what}")));
     writer.tendons(&tendons);
@@ -106,13 +113,14 @@ struct Held {
 }
 
 impl Held {
-    /// The values that stay at the joint if a tendon holds these.
+    /// The values that stay at a joint if a tendon, or another joint of its loop, holds these.
     fn moved_away(&self) -> Held {
-        Held {
-            friction: self.friction.map(|_| Friction { viscous: Some(0.0), coulomb: 0.0, std: [None; 2] }),
-            armature: self.armature.map(|_| 0.0),
-            spring: None,
-        }
+        let none = |friction: Friction| Friction {
+            viscous: friction.viscous.map(|_| 0.0),
+            coulomb: 0.0,
+            std: [None; 2],
+        };
+        Held { friction: self.friction.map(none), armature: self.armature.map(|_| 0.0), spring: None }
     }
 }
 
@@ -246,18 +254,7 @@ impl<'t, 'd> Writer<'t, 'd> {
     /// Writes the values of a joint of the chain, and its range if it has changed.
     fn joint(&mut self, old: &ChainJoint, joint: &Joint, held: &Held) {
         let Some(node) = self.joint_element(&old.name) else { return };
-        if let Some(friction) = &held.friction {
-            if friction.viscous != Some(0.0) || friction.coulomb != 0.0 || friction.std != [None; 2] {
-                self.edits.insert(node.range().start, comment(&format!("dyngen: {}", errors(friction))));
-            }
-            if let Some(viscous) = friction.viscous {
-                self.attribute(node, "damping", shortest(viscous));
-            }
-            self.attribute(node, "frictionloss", shortest(friction.coulomb));
-        }
-        if let Some(armature) = held.armature {
-            self.attribute(node, "armature", shortest(armature));
-        }
+        self.drive(node, held);
         let unit = if self.degrees && joint.kind == JointKind::Revolute {
             180.0 / std::f64::consts::PI
         } else {
@@ -270,6 +267,29 @@ impl<'t, 'd> Writer<'t, 'd> {
         }
         if let Some([low, high]) = joint.position.filter(|p| Some(*p) != old.position) {
             self.attribute(node, "range", format!("{} {}", shortest(low * unit), shortest(high * unit)));
+        }
+    }
+
+    /// Writes friction and armature of a hinge between two bars; a `<connect>` has none.
+    fn pin(&mut self, name: &str, held: &Held) {
+        if let Some(node) = self.joint_element(name) {
+            self.drive(node, held);
+        }
+    }
+
+    /// Writes friction and armature of a joint.
+    fn drive(&mut self, node: Node<'d, 't>, held: &Held) {
+        if let Some(friction) = &held.friction {
+            if friction.viscous != Some(0.0) || friction.coulomb != 0.0 || friction.std != [None; 2] {
+                self.edits.insert(node.range().start, comment(&format!("dyngen: {}", errors(friction))));
+            }
+            if let Some(viscous) = friction.viscous {
+                self.attribute(node, "damping", shortest(viscous));
+            }
+            self.attribute(node, "frictionloss", shortest(friction.coulomb));
+        }
+        if let Some(armature) = held.armature {
+            self.attribute(node, "armature", shortest(armature));
         }
     }
 

@@ -17,9 +17,11 @@ const VERSIONS: [&str; 2] = ["1.9", "1.11"];
 ///
 /// The frame of each link is on its joint's axis, z along it. `by` says in the first line what wrote the
 /// file; `more` are the caller's own notes, which stand in the file too.
-#[must_use]
-pub fn sdf(arm: &Arm, known: &Known, by: &str, more: &[String]) -> Exported {
-    let tree = Tree::new(arm, known);
+///
+/// # Errors
+/// If the arm has bars of closed loops.
+pub fn sdf(arm: &Arm, known: &Known, by: &str, more: &[String]) -> Result<Exported, String> {
+    let tree = Tree::new(arm, known)?;
     let mut notes = [more, &tree.notes].concat();
     let rotors: Vec<String> = (tree.links.iter())
         .filter_map(|link| Some(format!("'{}' {:.4e}", link.name, link.armature?)))
@@ -41,7 +43,7 @@ pub fn sdf(arm: &Arm, known: &Known, by: &str, more: &[String]) -> Exported {
     let mut text = String::new();
     // Writing to a String cannot fail.
     let _ = model(arm, &tree, by, &notes, &mut text);
-    Exported { text, notes }
+    Ok(Exported { text, notes })
 }
 
 fn model(arm: &Arm, tree: &Tree<'_>, by: &str, notes: &[String], text: &mut String) -> std::fmt::Result {
@@ -153,7 +155,7 @@ mod tests {
     fn what_is_known_stands_in_the_model() {
         let arm = arm("standard");
         let known = known(&arm);
-        let exported = sdf(&arm, &known, "written by a test", &["of the caller".to_string()]);
+        let exported = sdf(&arm, &known, "written by a test", &["of the caller".to_string()]).unwrap();
         assert!(exported.text.lines().next().unwrap().ends_with("<!-- written by a test -->"));
         let document = Document::parse(&exported.text).unwrap();
         let all = |name: &str| -> Vec<f64> {
@@ -172,7 +174,7 @@ mod tests {
         );
         // Down in frame 0 is along y of the base, which is turned about x by a quarter, and then about z.
         let expected = 9.81 * nalgebra::Vector3::new(-0.3f64.sin(), 0.3f64.cos(), 0.0);
-        assert!((Tree::new(&arm, &known).gravity - expected).norm() < 1e-12);
+        assert!((Tree::new(&arm, &known).unwrap().gravity - expected).norm() < 1e-12);
     }
 
     /// A name cannot end a comment or an attribute, and no link has the name of a joint.
@@ -183,7 +185,7 @@ mod tests {
         arm.name = "a <b> & \"c\"".to_string();
         arm.joints[0].name = Some("base".to_string());
         arm.joints[1].name = Some("base_link".to_string());
-        let text = sdf(&arm, &known, "-- a -->", &[]).text;
+        let text = sdf(&arm, &known, "-- a -->", &[]).unwrap().text;
         let document = Document::parse(&text).unwrap();
         let names = |kind: &str| -> Vec<String> {
             let of = document.descendants().filter(|n| n.tag_name().name() == kind);

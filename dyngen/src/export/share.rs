@@ -1,11 +1,12 @@
 //! The body of each link of a robot description: links that move together are one link of the arm.
 
-use super::body::{Body, apart, frames};
+use super::body::{Body, apart, frames, placed};
 use super::known::Known;
 use crate::arm::{Arm, Joint};
 use crate::import::Options;
-use crate::import::chain::{Chain, ChainJoint};
+use crate::import::chain::{self, Chain};
 use crate::import::pose::Pose;
+use crate::import::rounding;
 use crate::import::text::plain;
 use crate::import::urdf::Robot;
 use nalgebra::Matrix3;
@@ -24,8 +25,22 @@ pub(super) struct Share {
     pub(super) note: Option<String>,
 }
 
+/// The chain of the original, by the letter.
+pub(super) fn chain(robot: &Robot, arm: &Arm, options: &Options) -> Result<Chain, Vec<String>> {
+    let options = by_the_letter(robot, arm, options);
+    let mut chain = chain::chain(robot, &options)?;
+    if arm.bars.is_empty() {
+        chain.loops.clear();
+    }
+    // With numbers that are rounded a loop may not close.
+    if chain.bars().count() < arm.bars.len() {
+        chain.loops = chain::chain(&rounding::nearest(robot, &chain.read).0, &options)?.loops;
+    }
+    Ok(chain)
+}
+
 /// How the original is read: by the letter, and to the arm's last joint where no tip is given.
-pub(super) fn options(robot: &Robot, arm: &Arm, options: &Options) -> Options {
+fn by_the_letter(robot: &Robot, arm: &Arm, options: &Options) -> Options {
     let mut options = Options { exact: true, ..options.clone() };
     if options.tip.is_none() {
         let last = arm.joints.last().and_then(|joint| joint.name.as_ref());
@@ -38,7 +53,8 @@ pub(super) fn options(robot: &Robot, arm: &Arm, options: &Options) -> Options {
     options
 }
 
-/// The share of a link behind each joint; `holds` says whether a link of the description can hold an inertia.
+/// The share of a link behind each joint, then of one of each bar; `holds` says whether a link of the
+/// description can hold an inertia.
 pub(super) fn shares(
     arm: &Arm,
     chain: &Chain,
@@ -47,35 +63,56 @@ pub(super) fn shares(
     holds: &dyn Fn(&str) -> bool,
 ) -> Result<Vec<Share>, String> {
     same_arm(arm, chain)?;
-    let (links, _) = frames(arm);
-    let each = chain.joints.iter().zip(&links).enumerate();
-    each.map(|(i, (joint, frame))| {
+    let (mut frames, _) = frames(arm);
+    let base = placed(&arm.base);
+    let bars = chain.bars().zip(&arm.bars);
+    let of_bars: Vec<Pose> = bars.map(|((_, bar), own)| bar.frame(own, &base, &frames)).collect();
+    same_bars(arm, chain, &of_bars)?;
+    frames.extend(of_bars);
+    let links = chain.joints.iter().map(|joint| Rigid {
+        what: format!("the link behind joint '{}'", joint.name),
+        links: &joint.links,
+        poses: &joint.poses,
+    });
+    let bars = chain.bars().map(|(_, bar)| Rigid {
+        what: format!("bar '{}'", bar.name),
+        links: &bar.links,
+        poses: &bar.poses,
+    });
+    let each = links.chain(bars).zip(&frames).enumerate();
+    each.map(|(i, (rigid, frame))| {
         // From the arm's frame to the root link's.
         let back = frame.rotation.transpose();
         let back = Pose { rotation: back, origin: -(back * frame.origin) };
         let body = Body::of_parameters(&known.values[11 * i..][..10]).seen_from(&back);
-        share(joint, &body, robot, holds)
+        share(&rigid, &body, robot, holds)
     })
     .collect()
 }
 
+/// Links of the description that are one body of the arm.
+struct Rigid<'c> {
+    /// The body in words.
+    what: String,
+    links: &'c [String],
+    /// The frame of each of them.
+    poses: &'c [Pose],
+}
+
 /// A link that is fixed to the first one keeps its own inertia, if the rest is possible for the first one.
 fn share(
-    joint: &ChainJoint,
+    Rigid { what, links, poses }: &Rigid<'_>,
     body: &Body,
     robot: &Robot,
     holds: &dyn Fn(&str) -> bool,
 ) -> Result<Share, String> {
-    let all = || joint.links.iter().zip(&joint.poses).filter(|(name, _)| holds(name));
+    let all = || links.iter().zip(*poses).filter(|(name, _)| holds(name));
     let Some((name, pose)) = all().next() else {
         if body.mass == 0.0 && body.tensor.iter().all(|x| *x == 0.0) {
-            let link = joint.links.first().cloned().unwrap_or_default();
+            let link = links.first().cloned().unwrap_or_default();
             return Ok(Share { link, body: *body, emptied: Vec::new(), note: None });
         }
-        return Err(format!(
-            "joint '{}' and the one after it share a body: there is no place for the {} kg between them",
-            joint.name, body.mass
-        ));
+        return Err(format!("{what} has no body of its own: there is no place for its {} kg", body.mass));
     };
     let others: Vec<&String> = all().skip(1).map(|(name, _)| name).collect();
     let rest = all().skip(1).fold(*body, |rest, (name, pose)| rest.less(&own(robot, name, pose)));
@@ -85,7 +122,7 @@ fn share(
     }
     let note = format!(
         "link '{name}' has the whole inertia of {}: if the others kept theirs, no body could have the rest",
-        joint.links.join(", ")
+        links.join(", ")
     );
     let emptied = others.into_iter().cloned().collect();
     Ok(Share { link, body: body.seen_from(pose), emptied, note: Some(note) })
@@ -130,6 +167,32 @@ fn same_arm(arm: &Arm, chain: &Chain) -> Result<(), String> {
                 joint.name,
                 1e3 * distance,
                 1e3 * angle
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The description's loops must have the arm's bars.
+fn same_bars(arm: &Arm, chain: &Chain, frames: &[Pose]) -> Result<(), String> {
+    let count = chain.bars().count();
+    if count != arm.bars.len() {
+        let found = if count == 0 { "none".to_string() } else { count.to_string() };
+        return Err(format!(
+            "of the bars of closed loops that the arm has ({}), {found} are here: only a MuJoCo model with \
+             <connect> has them",
+            arm.bar_names()
+        ));
+    }
+    for (((closed, bar), frame), own) in chain.bars().zip(frames).zip(&arm.bars) {
+        let (normal, way) = (chain.joints[closed.first].direction, bar.pin - frame.origin);
+        let distance = (way - normal * normal.dot(&way)).norm();
+        if distance > APART {
+            return Err(format!(
+                "bar '{}': its pin lies {:.3} mm from that of bar '{}' of the arm file: it is another arm",
+                bar.name,
+                1e3 * distance,
+                own.name
             ));
         }
     }

@@ -51,7 +51,10 @@ pub(super) struct Tree<'a> {
 }
 
 impl<'a> Tree<'a> {
-    pub(super) fn new(arm: &'a Arm, known: &'a Known) -> Tree<'a> {
+    /// The tree of an arm that has no bars of closed loops.
+    pub(super) fn new(arm: &'a Arm, known: &'a Known) -> Result<Tree<'a>, String> {
+        arm.without_bars("this format")
+            .map_err(|e| format!("{e}; a MuJoCo model has their place (`dyngen export` --to mjcf)"))?;
         let (bodies, axes) = frames(arm);
         let names: Vec<String> = (0..arm.links()).map(|i| joint_name(arm, i)).collect();
         let links = (0..arm.links()).map(|i| {
@@ -76,13 +79,13 @@ impl<'a> Tree<'a> {
         });
         let links: Vec<Link<'_>> = links.collect();
         let base = placed(&arm.base);
-        Tree {
+        Ok(Tree {
             root: free("base".to_string(), &names),
             fixed: fixed(arm, &bodies, &axes),
             gravity: base.rotation * Vector3::from(arm.gravity.each_ref().map(to_f64)),
             notes: notes(arm, known, &links),
             links,
-        }
+        })
     }
 }
 
@@ -200,7 +203,7 @@ pub(super) mod tests {
     fn links_move_along_their_own_z_as_the_table_says() {
         for convention in ["standard", "modified"] {
             let (arm, known) = (arm(convention), known(&arm(convention)));
-            let tree = Tree::new(&arm, &known);
+            let tree = Tree::new(&arm, &known).unwrap();
             let q = [0.7, 0.25, -1.3];
             let mut moved = arm.clone();
             for (joint, q) in moved.joints.iter_mut().zip(q) {

@@ -5,7 +5,6 @@ use super::edit::{Edits, child, comment, indentation, shortest};
 use super::known::{Friction, Known};
 use super::share;
 use crate::arm::{Arm, Joint};
-use crate::import::chain;
 use crate::import::urdf::read;
 use crate::import::{ImportError, Options};
 use roxmltree::{Document, Node, ParsingOptions};
@@ -35,8 +34,7 @@ pub fn urdf(
     let refused = |reasons| ImportError::refused(file, reasons);
     let robot =
         read(text).map_err(|e| ImportError::Unreadable(format!("{file}: cannot be read as a URDF: {e}")))?;
-    let options = share::options(&robot, arm, options);
-    let chain = chain::chain(&robot, &options).map_err(refused)?;
+    let chain = share::chain(&robot, arm, options).map_err(refused)?;
     let shares = share::shares(arm, &chain, &robot, known, &|_| true).map_err(|e| refused(vec![e]))?;
     let parsing = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, parsing).map_err(|e| {

@@ -13,9 +13,11 @@ use std::fmt::Write;
 ///
 /// Angles are in degrees, as UsdPhysics has them, and so is what is by an angle. `by` says in the second line
 /// what wrote the file; `more` are the caller's own notes, which stand in the file too.
-#[must_use]
-pub fn usd(arm: &Arm, known: &Known, by: &str, more: &[String]) -> Exported {
-    let tree = Tree::new(arm, known);
+///
+/// # Errors
+/// If the arm has bars of closed loops.
+pub fn usd(arm: &Arm, known: &Known, by: &str, more: &[String]) -> Result<Exported, String> {
+    let tree = Tree::new(arm, known)?;
     let mut notes = [more, &tree.notes].concat();
     if tree.links.iter().any(|link| link.armature.is_some()) {
         notes.push(
@@ -39,7 +41,7 @@ pub fn usd(arm: &Arm, known: &Known, by: &str, more: &[String]) -> Exported {
         Stage { text: String::new(), root: identifier(&arm.name, &mut Vec::new()), taken: Vec::new() };
     // Writing to a String cannot fail.
     let _ = stage.write(&tree, by, &notes);
-    Exported { text: stage.text, notes }
+    Ok(Exported { text: stage.text, notes })
 }
 
 struct Stage {
@@ -232,10 +234,10 @@ mod tests {
     fn what_is_known_stands_in_the_stage() {
         let arm = arm("modified");
         let known = known(&arm);
-        let exported = usd(&arm, &known, "written by\na test", &[]);
+        let exported = usd(&arm, &known, "written by\na test", &[]).unwrap();
         let text = &exported.text;
         assert!(text.starts_with("#usda 1.0\n# written by a test\n"));
-        let tree = Tree::new(&arm, &known);
+        let tree = Tree::new(&arm, &known).unwrap();
         for (i, link) in tree.links.iter().enumerate() {
             let (centre, tensor) = link.body.centre();
             // The base is the first body.

@@ -1,7 +1,7 @@
 //! From a URDF's tree of links to the chain of bodies between its root and a tip.
 
 use super::Options;
-use super::loops::{self, ChainLoop};
+use super::loops::{self, ChainBar, ChainLoop};
 use super::pose::Pose;
 use super::tree::Tree;
 use super::urdf::{Joint, Link, Mimic, Motor, Origin, Robot};
@@ -27,6 +27,13 @@ pub(crate) struct Chain {
     /// the way to what an equality connects.
     pub(crate) read: Vec<usize>,
     pub(crate) notes: Vec<String>,
+}
+
+impl Chain {
+    /// The bars of its loops in the order of the arm's, each with its loop.
+    pub(crate) fn bars(&self) -> impl Iterator<Item = (&ChainLoop, &ChainBar)> {
+        self.loops.iter().flat_map(|closed| closed.bars.iter().map(move |bar| (closed, bar)))
+    }
 }
 
 /// A joint that moves, with the body behind it.

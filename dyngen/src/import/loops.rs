@@ -5,6 +5,8 @@ use super::chain::{ChainJoint, Mass, held, masses};
 use super::pose::Pose;
 use super::tree::Tree;
 use super::urdf::{Connect, Mimic};
+use crate::arm::Bar;
+use crate::exact::rational;
 use nalgebra::Vector3;
 
 /// Points and directions nearer than this are the same, m or as a sine.
@@ -31,7 +33,21 @@ pub(crate) struct ChainLoop {
 /// A bar of a loop.
 pub(crate) struct ChainBar {
     pub(crate) name: String,
+    /// The pin at which its frame is, m.
+    pub(crate) pin: Vector3<f64>,
+    /// The links that move as one, with the frame of each of them.
+    pub(crate) links: Vec<String>,
+    pub(crate) poses: Vec<Pose>,
     pub(crate) masses: Vec<Mass>,
+}
+
+impl ChainBar {
+    /// The frame of this bar in an arm, whose base and links have these frames at q = 0.
+    pub(crate) fn frame(&self, in_arm: &Bar, base: &Pose, links: &[Pose]) -> Pose {
+        let frame = |link: Option<usize>| link.map_or(base, |link| &links[link]);
+        let pin = Vector3::from(in_arm.pin.each_ref().map(rational::to_f64));
+        Pose { rotation: frame(in_arm.parallel).rotation, origin: frame(in_arm.carrier).point(pin) }
+    }
 }
 
 /// A loop's joint: what it joins, by the joints that move them, and where it is.
@@ -95,7 +111,9 @@ pub(super) fn close(
     let corners: Vec<Vector3<f64>> = own.into_iter().chain(pins.iter().map(|pin| pin.point)).collect();
     let directions = pins.iter().filter_map(|pin| pin.direction).chain([last_joint.direction]);
     let sides = parallelogram(&corners, first_joint.direction, directions)?;
-    let bar = |node: &Option<usize>| ChainBar { name: seen.name(*node), masses: seen.masses(*node) };
+    // The first bar's frame is at the first pin, that of a second one at the last pin.
+    let at = [0, pins.len() - 1].map(|k| pins[k].point);
+    let bar = |(node, pin): (&Option<usize>, Vector3<f64>)| seen.bar(*node, pin);
     let mut notes = Vec::new();
     for joint in of_bars.iter().map(|j| &tree.robot.joints[*j]) {
         if joint.motor.is_some_and(|motor| motor.armature != 0.0) {
@@ -108,7 +126,7 @@ pub(super) fn close(
         lengths: std::array::from_fn(|k| sides[k % 2].norm()),
         outer: sides[last - first],
         inner: -sides[CORNERS - 1],
-        bars: bars.iter().map(bar).collect(),
+        bars: bars.iter().zip(at).map(bar).collect(),
         pins: pins.into_iter().map(|pin| pin.name).collect(),
     };
     if first != last {
@@ -204,9 +222,17 @@ impl Seen<'_, '_> {
         (0..self.tree.robot.links.len()).filter(moves)
     }
 
-    fn masses(&self, joint: Option<usize>) -> Vec<Mass> {
-        let of = |link: usize| masses(&self.tree.robot.links[link], &self.pose(link), self.tolerance);
-        self.rigid(joint).filter_map(of).collect()
+    /// A bar behind a joint, whose frame is at a pin.
+    fn bar(&self, joint: Option<usize>, pin: Vector3<f64>) -> ChainBar {
+        let links: Vec<usize> = self.rigid(joint).collect();
+        let masses = |link: &usize| masses(&self.tree.robot.links[*link], &self.pose(*link), self.tolerance);
+        ChainBar {
+            name: self.name(joint),
+            pin,
+            links: links.iter().map(|link| self.tree.robot.links[*link].name.clone()).collect(),
+            poses: links.iter().map(|link| self.pose(*link)).collect(),
+            masses: links.iter().filter_map(masses).collect(),
+        }
     }
 
     fn name(&self, joint: Option<usize>) -> String {

@@ -20,7 +20,7 @@ pub(crate) mod mjcf;
 mod numbers;
 mod orientation;
 pub(crate) mod pose;
-mod rounding;
+pub(crate) mod rounding;
 mod shapes;
 mod source;
 pub(crate) mod text;

@@ -21,7 +21,7 @@ const DECIMALS: [i32; 3] = [2, 3, 4];
 
 /// The robot with the rounded numbers of some joints as they were meant, and what was moved: a line for each
 /// joint.
-pub(super) fn nearest(robot: &Robot, joints: &[usize]) -> (Robot, Vec<String>) {
+pub(crate) fn nearest(robot: &Robot, joints: &[usize]) -> (Robot, Vec<String>) {
     let mut nearest = robot.clone();
     let mut moved = Vec::new();
     for index in joints {

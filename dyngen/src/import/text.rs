@@ -212,12 +212,9 @@ fn ratio(joint: &ChainJoint) -> Option<f64> {
 /// The inertial parameters of every link in its new frame, then of every bar.
 pub(super) fn values(chain: &Chain, frames: &Frames, arm: &Arm) -> Vec<(Parameter, f64)> {
     let links = chain.joints.iter().zip(&frames.links).enumerate();
-    let bars = chain.loops.iter().flat_map(|closed| &closed.bars).zip(&arm.bars).zip(arm.links()..);
-    let of_bars = bars.flat_map(|((bar, of), link)| {
-        let frame = |link: Option<usize>| link.map_or(&frames.base, |link| &frames.links[link]);
-        let pin = Vector3::from(of.pin.each_ref().map(rational::to_f64));
-        let frame = Pose { rotation: frame(of.parallel).rotation, origin: frame(of.carrier).point(pin) };
-        let values = link_values(&bar.masses, &frame);
+    let bars = chain.bars().zip(&arm.bars).zip(arm.links()..);
+    let of_bars = bars.flat_map(|(((_, bar), of), link)| {
+        let values = link_values(&bar.masses, &bar.frame(of, &frames.base, &frames.links));
         ParameterKind::ALL.into_iter().zip(values).map(move |(kind, value)| (Parameter { link, kind }, value))
     });
     links

@@ -93,7 +93,7 @@ impl ArmResult {
             }
         };
         let more = [self.notes, undescribed(&self.model)].concat();
-        let exported = write(&self.arm, &self.known, &by, &more);
+        let exported = write(&self.arm, &self.known, &by, &more).map_err(Failure::Refused)?;
         Ok((exported.text.into_bytes(), exported.notes))
     }
 }
