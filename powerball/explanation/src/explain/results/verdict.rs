@@ -241,7 +241,7 @@ fn is_named(explained: &Explained, name: &str, joints: &[JointNumber]) -> bool {
     explained.effects.iter().any(|effect| effect.is(name, joints))
 }
 
-// How often a name with such evidence is right: a curve that was fitted to arms whose effects are known.
+// How often a name with such evidence is right: a curve that was fitted to logs whose effects are known.
 
 /// The evidence for a name: features that predict how often such a name is right.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -258,11 +258,12 @@ pub struct Evidence {
 pub const FEATURES: usize = 4;
 
 /// Weights of the features: logistic regression (D. R. Cox, "The regression analysis of binary sequences",
-/// 1958) on one half of drawn arms, judged on the other half. `cargo run --release -p xtask -- probability`
-/// fits them again.
+/// 1958) on effects of simulated arms and on effects put into measured logs.
+/// `cargo run --release -p xtask -- probability` fits them again, and judges them by set.
 const COEFFICIENTS: [f64; FEATURES] = [1.74, 2.36, 1.81, -2.71];
 
-/// A larger margin says no more.
+/// A larger margin says no more, nor does one below its inverse. Below 1 another name fits better: a class
+/// with a small margin is right far less often than one with a margin of about 1.
 const LARGEST_MARGIN: f64 = 20.0;
 /// Some hundred names cannot speak of less than one in a hundred.
 const SUREST: f64 = 0.99;
@@ -277,7 +278,7 @@ impl Evidence {
     /// 1, whether another name fits as well, the logarithm of the margin, and the remaining share.
     #[must_use]
     pub fn features(&self) -> [f64; FEATURES] {
-        let margin = within(self.margin, [1.0, LARGEST_MARGIN]).ln();
+        let margin = within(self.margin, [1.0 / LARGEST_MARGIN, LARGEST_MARGIN]).ln();
         // By what is gone, since what is not a number counts as the lower end.
         let leftover = 1.0 - within(1.0 - self.leftover, [0.0, 1.0]);
         [1.0, f64::from(u8::from(self.alike)), margin, leftover]
@@ -310,12 +311,15 @@ mod probability_tests {
         for worse in [Evidence { margin: 1.05, ..CLEAR }, Evidence { leftover: 0.6, ..CLEAR }] {
             assert!(worse.probability() < sure, "{worse:?}: {} against {sure}", worse.probability());
         }
+        let class = Evidence { margin: 1.0, alike: true, ..CLEAR };
+        let second = Evidence { margin: 0.2, ..class };
+        assert!(second.probability() < class.probability(), "a name that others fit far better");
     }
 
     #[test]
     fn what_is_no_number_is_no_evidence() {
         let nothing = Evidence { margin: f64::NAN, leftover: f64::NAN, ..CLEAR };
-        let least = Evidence { margin: 1.0, leftover: 1.0, ..CLEAR };
+        let least = Evidence { margin: 0.0, leftover: 1.0, ..CLEAR };
         assert_eq!(nothing.probability(), least.probability());
         let endless = Evidence { margin: f64::INFINITY, ..CLEAR };
         assert!(endless.probability() >= CLEAR.probability());
