@@ -8,6 +8,7 @@ use super::judge::{Named, Outcome};
 use super::reliability::wilson;
 use faer::Mat;
 use faer::linalg::solvers::Solve;
+use powerball::explanation::Rule;
 use powerball::explanation::explain::{Evidence, FEATURES};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -95,9 +96,13 @@ fn line(outcome: &Outcome, named: &Named) -> Option<String> {
 /// The set of a line, and what the curve reads of it.
 fn case(line: &str) -> Option<(&str, Case)> {
     let cells: Vec<&str> = line.split(',').collect();
-    let [set, _, _, right, margin, alike, _, leftover, ..] = cells[..] else { return None };
-    let evidence =
-        Evidence { margin: margin.parse().ok()?, alike: alike == "1", leftover: leftover.parse().ok()? };
+    let [set, _, _, right, margin, alike, _, leftover, _, time] = cells[..] else { return None };
+    let evidence = Evidence {
+        margin: margin.parse().ok()?,
+        alike: alike == "1",
+        leftover: leftover.parse().ok()?,
+        time: time.parse::<f64>().ok()? / Rule::default().least_time,
+    };
     Some((set, Case { evidence, features: evidence.features(), right: right == "1" }))
 }
 
@@ -215,7 +220,7 @@ mod tests {
             features.iter_mut().for_each(|x| *x = rng.random_range(-1.0..1.0));
             features[0] = 1.0;
             let right = rng.random_bool(probability(&truth, &features));
-            let evidence = Evidence { margin: 1.0, alike: false, leftover: 0.0 };
+            let evidence = Evidence { margin: 1.0, alike: false, leftover: 0.0, time: 1.0 };
             Case { evidence, features, right }
         };
         let cases: Vec<Case> = (0..4000).map(draw).collect();
@@ -229,7 +234,7 @@ mod tests {
     /// A set whose names are right less often shows it by the curve of the others, which it did not shape.
     #[test]
     fn a_set_is_judged_by_the_curve_of_the_others() {
-        let evidence = Evidence { margin: 2.0, alike: false, leftover: 0.1 };
+        let evidence = Evidence { margin: 2.0, alike: false, leftover: 0.1, time: 1.0 };
         let names = |right: usize| -> Vec<Case> {
             (0..100).map(|k| Case { evidence, features: evidence.features(), right: k < right }).collect()
         };
