@@ -101,8 +101,8 @@ pub struct Rule {
     /// A residual of this many times the noise floor is looked at for what it depends on, where it is
     /// coloured ([`unlike`](Self::unlike)).
     pub above_floor: f64,
-    /// Below this time of motion a reader is warned that the folds are too short to tell much, and servos
-    /// have no friction that changes with running time, s.
+    /// Below this time of motion a reader is warned that the folds are too short to tell much, names are less
+    /// probable, and servos have no friction that changes with running time, s.
     pub least_time: f64,
 }
 

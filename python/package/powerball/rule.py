@@ -102,8 +102,8 @@ class Rule:
     #: A residual of this many times the noise floor is looked at for what it depends on, where it is
     #: coloured (``unlike``).
     above_floor: float = 1.2
-    #: Below this time of motion a reader is warned that the folds are too short to tell much, and servos
-    #: have no friction that changes with running time, s.
+    #: Below this time of motion a reader is warned that the folds are too short to tell much, names are
+    #: less probable, and servos have no friction that changes with running time, s.
     least_time: float = 30.0
 
 

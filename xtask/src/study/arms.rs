@@ -91,26 +91,34 @@ impl Drawn {
 
     /// Where effects sit on it: on joint `on`, from 0, or anywhere.
     pub(super) fn places(&self, on: Option<usize>) -> Places {
-        let (plant, joints) = (&self.plant, 0..self.plant.friction().len());
-        let coulomb = |j: usize| plant.friction()[j].gamma1 + plant.friction()[j].gamma3;
-        let any: Vec<usize> = joints.clone().filter(|j| on.is_none_or(|on| on == *j)).collect();
-        let coupled = |&onto: &usize| {
-            let from = if onto == 0 { 1 } else { onto - 1 };
-            ([from, onto], coulomb(onto) / coulomb(from))
-        };
-        let stiffness = |j: usize| {
-            let usual = plant.sensors().white[j] / (NOISE * plant.dynamics().usual_way(j));
-            usual / 0.015..usual / 0.003
-        };
-        Places {
-            large: any.clone(),
-            loaded: any.clone(),
-            symmetric: self.symmetric.iter().map(|link| (*link, 0.015)).collect(),
-            coupled: any.iter().map(coupled).collect(),
-            stiffness: joints.map(stiffness).collect(),
-            flange: 0.035,
-            any,
-        }
+        let usual: Vec<f64> = self.plant.sensors().white.iter().map(|noise| noise / NOISE).collect();
+        let symmetric = self.symmetric.iter().map(|link| (*link, 0.015)).collect();
+        Places { symmetric, ..places(&self.plant, &usual, on) }
+    }
+}
+
+/// Where effects sit on an arm without declared symmetries: on joint `on`, from 0, or anywhere; `usual`: the
+/// rms of each joint's torque, N·m or N.
+pub(super) fn places(plant: &Plant, usual: &[f64], on: Option<usize>) -> Places {
+    let joints = 0..plant.friction().len();
+    let coulomb = |j: usize| plant.friction()[j].gamma1 + plant.friction()[j].gamma3;
+    let any: Vec<usize> = joints.clone().filter(|j| on.is_none_or(|on| on == *j)).collect();
+    let coupled = |&onto: &usize| {
+        let from = if onto == 0 { 1 } else { onto - 1 };
+        ([from, onto], coulomb(onto) / coulomb(from))
+    };
+    let stiffness = |j: usize| {
+        let usual = usual[j] / plant.dynamics().usual_way(j);
+        usual / 0.015..usual / 0.003
+    };
+    Places {
+        large: any.clone(),
+        loaded: any.clone(),
+        symmetric: Vec::new(),
+        coupled: any.iter().map(coupled).collect(),
+        stiffness: joints.map(stiffness).collect(),
+        flange: 0.035,
+        any,
     }
 }
 

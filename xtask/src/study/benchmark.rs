@@ -174,6 +174,7 @@ fn outcome(truth: Truth, answer: Answer) -> Outcome {
         case: format!("{} {}", truth.case, truth.of),
         table: truth.table,
         truth: truth.effects,
+        truth_joints: Vec::new(),
         law: truth.words,
         sizes: truth.sizes,
         named: answer.effects.into_iter().map(named).collect(),

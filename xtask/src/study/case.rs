@@ -2,6 +2,7 @@
 
 use super::alike::PAIRS;
 use super::law::Outside;
+use super::measured::{SOURCES, UR10E};
 use chacha20::ChaCha8Rng;
 use clap::ValueEnum;
 use powerball::virtual_arm::PlantEffect as Effect;
@@ -9,7 +10,7 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use std::ops::Range;
 
-/// The tables of a study.
+/// The tables of a study; a new one stands last, since its place is in the seeds of its cases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Table {
     /// One effect of size 0.3 to 1.5
@@ -44,6 +45,8 @@ pub(super) enum Table {
     Drawn,
     /// Arms, friction, logs and sensors as of the drawn pairs, without an effect
     CleanDrawn,
+    /// One effect of size 0.3 to 1.5 put into measured logs of each arm that has two or more
+    MeasuredArms,
 }
 
 impl Table {
@@ -53,7 +56,7 @@ impl Table {
 
     /// Whether it needs measured logs.
     pub(super) fn measured(self) -> bool {
-        matches!(self, Table::Measured | Table::MeasuredSmall)
+        matches!(self, Table::Measured | Table::MeasuredSmall | Table::MeasuredArms)
     }
 
     /// Whether every case has an arm of its own.
@@ -92,6 +95,7 @@ impl Table {
             }
             Table::Measured => "one effect of size 1 put into the measured UR10e logs",
             Table::MeasuredSmall => "one effect of size 0.6 put into the measured UR10e logs",
+            Table::MeasuredArms => "one effect of size 0.3 to 1.5 put into measured logs of several arms",
             Table::Arms => "one effect of size 0.3 to 1.5 on arms drawn by lot, white noise",
             Table::CleanArms => "no effect, arms drawn by lot, white noise",
             Table::Drawn => {
@@ -113,6 +117,7 @@ impl Table {
             Table::Friction | Table::Misfit | Table::ColouredEffect | Table::Alike => 5,
             Table::Measured | Table::MeasuredSmall => 3,
             Table::Arms => 5,
+            Table::MeasuredArms => 15,
             Table::CleanArms | Table::Drawn | Table::CleanDrawn => 50,
         }
     }
@@ -136,6 +141,8 @@ pub(super) struct Case {
     pub(super) kinds: Vec<String>,
     /// How large each is to be: RMS left after the base is refitted over the RMS of the noise, worst joint.
     pub(super) sizes: Vec<f64>,
+    /// The folder of the measured logs; empty on simulated arms.
+    pub(super) folder: &'static str,
     pub(super) seed: u64,
 }
 
@@ -145,35 +152,44 @@ impl Case {
         let mut cases = Vec::new();
         for seed in seeds.unwrap_or(0..table.seeds()) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1000) + table as u64);
-            let mut size = || {
+            let size = |rng: &mut ChaCha8Rng| {
                 let range = table.sizes();
                 f64::exp(rng.random_range(range.start.ln()..range.end.ln()))
             };
+            let folder = if table.measured() { UR10E.folder } else { "" };
             let mut add =
-                |kinds: Vec<String>, sizes: Vec<f64>| cases.push(Case { table, kinds, sizes, seed });
+                |kinds: Vec<String>, sizes: Vec<f64>| cases.push(Case { table, kinds, sizes, folder, seed });
             match table {
                 Table::Clean | Table::Coloured | Table::CleanArms | Table::CleanDrawn => {
                     add(Vec::new(), Vec::new())
                 }
                 Table::Outside => {
                     for law in Outside::ALL {
-                        add(vec![law.name().to_string()], vec![size()]);
+                        add(vec![law.name().to_string()], vec![size(&mut rng)]);
                     }
                 }
                 Table::Alike => {
                     for name in PAIRS.into_iter().flatten() {
-                        add(vec![name.to_string()], vec![size()]);
+                        add(vec![name.to_string()], vec![size(&mut rng)]);
+                    }
+                }
+                Table::MeasuredArms => {
+                    for source in &SOURCES {
+                        let size = vec![size(&mut rng)];
+                        let kind = Effect::chosen_by_seed().choose(&mut rng).map(|n| (*n).to_string());
+                        let kinds = kind.into_iter().collect();
+                        cases.push(Case { table, kinds, sizes: size, folder: source.folder, seed });
                     }
                 }
                 Table::Pairs | Table::Drawn => {
-                    let sizes = vec![size(), size()];
+                    let sizes = vec![size(&mut rng), size(&mut rng)];
                     let two: Vec<String> =
                         Effect::chosen_by_seed().sample(&mut rng, 2).map(|n| (*n).to_string()).collect();
                     add(two, sizes);
                 }
                 _ => {
                     for name in Effect::NAMES {
-                        add(vec![name.to_string()], vec![size()]);
+                        add(vec![name.to_string()], vec![size(&mut rng)]);
                     }
                 }
             }
@@ -181,9 +197,13 @@ impl Case {
         cases
     }
 
-    /// What tells it from every other one.
+    /// Its table, its kinds, its measured arm if there are several, and its seed.
     pub(super) fn name(&self) -> String {
-        format!("{}/{}/{}", self.table.name(), self.kinds.join("+"), self.seed)
+        let (table, kinds) = (self.table.name(), self.kinds.join("+"));
+        match self.table {
+            Table::MeasuredArms => format!("{table}/{kinds}/{}/{}", self.folder, self.seed),
+            _ => format!("{table}/{kinds}/{}", self.seed),
+        }
     }
 
     /// A generator of its own.

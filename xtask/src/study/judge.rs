@@ -48,6 +48,9 @@ pub(super) struct Outcome {
     pub(super) case: String,
     pub(super) table: String,
     pub(super) truth: Vec<String>,
+    /// The joints on which the truth is, from 1; empty if any joint counts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) truth_joints: Vec<usize>,
     /// In words.
     pub(super) law: Vec<String>,
     /// Visible sizes.
@@ -89,6 +92,7 @@ impl Outcome {
             case: case.name(),
             table: case.table.name(),
             truth: case.kinds.clone(),
+            truth_joints: Vec::new(),
             law,
             sizes,
             named: named(explained).into_iter().filter(new).collect(),
@@ -111,7 +115,8 @@ impl Outcome {
 
     /// Whether everything that is there was named.
     pub(super) fn all_right(&self) -> bool {
-        self.truth.iter().all(|t| self.named.iter().any(|n| n.effect == *t || n.alike.contains(t)))
+        let named = || self.named.iter().filter(|n| self.names_truth(n));
+        self.truth.iter().all(|t| named().any(|n| n.effect == *t || n.alike.contains(t)))
     }
 
     /// Names given to what is not there.
@@ -119,9 +124,11 @@ impl Outcome {
         self.named.iter().filter(|n| !self.names_truth(n)).count()
     }
 
-    /// Whether a name is of something that is there, or of its class.
+    /// Whether a name is of something that is there, or of its class, on its joint where that is known.
     pub(super) fn names_truth(&self, named: &Named) -> bool {
-        self.truth.iter().any(|t| named.effect == *t || named.alike.contains(t))
+        let there =
+            self.truth_joints.is_empty() || self.truth_joints.iter().any(|j| named.joints.contains(j));
+        there && self.truth.iter().any(|t| named.effect == *t || named.alike.contains(t))
     }
 
     /// For the eye.

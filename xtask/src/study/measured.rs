@@ -1,7 +1,8 @@
 //! Effects put into measured logs: what the plant would add along the motion that was measured is added to
 //! what was measured.
 
-use super::case::Case;
+use super::arms::{LARGEST_FACTOR, places};
+use super::case::{Case, Table};
 use super::judge::{Named, Outcome, named};
 use dyngen::Arm;
 use powerball::controller::friction::TanhFriction;
@@ -12,13 +13,54 @@ use powerball::identification::motion::Motion;
 use powerball::logs::log::{Log, common_clock, read_logs};
 use powerball::logs::regression::{Data, DataOptions, Recording, RigidArm, Signals};
 use powerball::logs::summary::Summary;
-use powerball::virtual_arm::{Dynamics, Plant, PlantEffect as Effect, Sensors, bodies, lwa4p};
+use powerball::virtual_arm::{Dynamics, Places, Plant, PlantEffect as Effect, Sensors, bodies, lwa4p};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Logs to fit and logs held out: other paths.
-const FIT: [&str; 5] = ["12a", "12b", "12c", "7", "8"];
-const HELD_OUT: [&str; 2] = ["5", "14"];
+/// The logs of a measured arm: those to fit and those held out are of other paths.
+pub(super) struct Source {
+    pub(super) folder: &'static str,
+    fit: &'static [&'static str],
+    held_out: &'static [&'static str],
+    /// Further clean logs, which show what the arm has of itself.
+    more: &'static [&'static str],
+}
+
+/// The logs of the tables that have this arm alone.
+pub(super) const UR10E: Source = Source {
+    folder: "ur10e",
+    fit: &["fourier_12a", "fourier_12b", "fourier_12c", "fourier_7", "fourier_8"],
+    held_out: &["fourier_5", "fourier_14"],
+    more: &[],
+};
+
+/// A few minutes of each arm whose logs stand for more than one path.
+pub(super) const SOURCES: [Source; 8] = [
+    Source {
+        folder: "ur10e",
+        fit: &["fourier_12a", "fourier_7", "fourier_8"],
+        held_out: &["fourier_5"],
+        more: &[],
+    },
+    Source { folder: "ur5_pushes", fit: &["no7", "no8"], held_out: &["no9"], more: &["no6"] },
+    Source { folder: "psm_masses", fit: &["clean"], held_out: &["other"], more: &[] },
+    Source { folder: "tx40", fit: &["fit"], held_out: &["validate"], more: &[] },
+    Source { folder: "panda", fit: &["fit"], held_out: &["validate"], more: &[] },
+    Source {
+        folder: "kinova_in_step",
+        fit: &["trajectory_1", "trajectory_3", "trajectory_5"],
+        held_out: &["trajectory_2", "trajectory_4"],
+        more: &[],
+    },
+    Source { folder: "rokae", fit: &["part_1", "part_2"], held_out: &["part_3"], more: &[] },
+    Source {
+        folder: "pendulum_A",
+        fit: &["sysid_1", "sysid_2", "sysid_3", "sysid_4", "sysid_5"],
+        held_out: &["sysid_6", "sysid_7", "sysid_8"],
+        more: &[],
+    },
+];
+
 /// The grid on which the motion is followed, s, and its smoothing, Hz.
 const STEP: f64 = 0.005;
 const SMOOTHING: f64 = 8.0;
@@ -33,15 +75,22 @@ const DRAWS: usize = 20;
 /// The measured arm, a plant like it, and what is in its logs already.
 pub(super) struct Measured {
     body: RigidArm,
+    /// All logs, those to fit first.
     logs: Vec<Log>,
+    fitted: usize,
     plant: Plant,
+    places: Places,
     explained: Explained,
     known: Vec<Named>,
 }
 
 impl Measured {
-    /// `None` where the logs are not there.
-    pub(super) fn read(folder: &Path) -> Result<Option<Measured>, String> {
+    /// The arm of a table's logs in a folder below `data`; `None` where they are not there.
+    pub(super) fn read(data: &Path, table: Table, folder: &str) -> Result<Option<Measured>, String> {
+        let alone = table != Table::MeasuredArms;
+        let own = SOURCES.iter().find(|source| source.folder == folder);
+        let source = if alone { &UR10E } else { own.ok_or("no such arm")? };
+        let folder = data.join(folder);
         let file = folder.join("arm.toml");
         if !file.exists() {
             eprintln!("skipped: no measured logs in {}", folder.display());
@@ -49,19 +98,22 @@ impl Measured {
         }
         let arm = Arm::read(&file).map_err(|e| e.to_string())?;
         let files: Vec<PathBuf> =
-            FIT.iter().chain(&HELD_OUT).map(|name| folder.join(format!("fourier_{name}.csv"))).collect();
+            source.fit.iter().chain(source.held_out).map(|name| folder.join(format!("{name}.csv"))).collect();
         let (mut logs, _) = read_logs(&files, &arm).map_err(|e| e.to_string())?;
         common_clock(&mut logs);
         let body = RigidArm::new(&arm).map_err(|e| e.to_string())?;
+        let fitted = source.fit.len();
         let options = DataOptions::default();
-        let explained =
-            explain_body(&body, &logs[..FIT.len()], &logs[FIT.len()..], &ExplainOptions::default())
-                .map_err(|e| e.to_string())?;
+        let explain = |fit: &[Log], held_out: &[Log]| {
+            explain_body(&body, fit, held_out, &ExplainOptions::default()).map_err(|e| e.to_string())
+        };
+        let (to_fit, held_out) = logs.split_at(fitted);
+        let explained = explain(to_fit, held_out)?;
         let plant = {
-            let data = Data::new(&body, &logs[..FIT.len()], &options).map_err(|e| e.to_string())?;
+            let data = Data::new(&body, &logs[..fitted], &options).map_err(|e| e.to_string())?;
             let base = fit(&data, &Folds::new(&data), &[], None);
             let mut summary = Summary::new(&body, &options);
-            for log in &logs[..FIT.len()] {
+            for log in &logs[..fitted] {
                 summary.push(&body, log, &options).map_err(|e| e.to_string())?;
             }
             let reduced = solve_reduced(&summary, FrictionKind::Symmetric);
@@ -78,8 +130,28 @@ impl Measured {
             };
             Plant::new(dynamics, friction, sensors)
         };
-        let known = named(&explained);
-        Ok(Some(Measured { body, logs, plant, explained, known }))
+        let places = if alone { lwa4p::places() } else { places(&plant, &usual(&logs), None) };
+        let mut known = named(&explained);
+        if !alone {
+            // What the arm has of itself is more than one way of splitting its logs shows.
+            let more: Vec<PathBuf> =
+                source.more.iter().map(|name| folder.join(format!("{name}.csv"))).collect();
+            let (more, _) = read_logs(&more, &arm).map_err(|e| e.to_string())?;
+            let mut all: Vec<Log> = logs.iter().cloned().chain(more).collect();
+            common_clock(&mut all);
+            let mut others = named(&explain(held_out, to_fit)?);
+            for _ in 0..all.len() {
+                all.rotate_left(1);
+                others.extend(named(&explain(&all[1..], &all[..1])?));
+            }
+            for other in others {
+                match known.iter_mut().find(|name| name.effect == other.effect) {
+                    Some(name) => name.joints.extend(other.joints),
+                    None => known.push(other),
+                }
+            }
+        }
+        Ok(Some(Measured { body, logs, fitted, plant, places, explained, known }))
     }
 
     /// Runs a case; `None` where every draw is in the logs already.
@@ -88,33 +160,35 @@ impl Measured {
         let mut rng = case.rng();
         let clock = |log: &Log, k: usize| log.t.get(k).copied().unwrap_or(0.0) + log.clock;
         let end = self.logs.iter().map(|log| clock(log, log.t.len().saturating_sub(1))).fold(0.0, f64::max);
-        let third = &self.logs[2];
-        let length = third.t.last().copied().unwrap_or(0.0) - third.t.first().copied().unwrap_or(0.0);
-        let begins = clock(third, 0) + 0.3 * length..clock(third, 0) + 0.6 * length;
+        let last = &self.logs[(self.fitted - 1).min(2)];
+        let length = last.t.last().copied().unwrap_or(0.0) - last.t.first().copied().unwrap_or(0.0);
+        let begins = clock(last, 0) + 0.3 * length..clock(last, 0) + 0.6 * length;
         let known = |effect: &Effect| {
             let joints = effect.joints();
             let same = |n: &Named| n.effect == effect.name() && joints.iter().all(|j| n.joints.contains(j));
             self.known.iter().any(same)
         };
         let drawn = (0..DRAWS)
-            .filter_map(|_| lwa4p::draw_effect(kind, &self.plant, end, begins.clone(), &mut rng))
+            .filter_map(|_| Effect::draw(kind, &self.plant, &self.places, end, begins.clone(), &mut rng))
             .find(|effect| !known(effect));
         let Some(mut effect) = drawn else { return Ok(None) };
-        let mut reached = 0.0;
+        let (mut reached, mut factor) = (0.0, 1.0);
         for _ in 0..ROUNDS {
             reached = self.visible(&self.with(&effect)?)?;
             if (reached / size - 1.0).abs() < 0.03 {
                 break;
             }
             effect = effect.scaled(size / reached);
+            factor *= size / reached;
         }
-        // Some effects cannot be made that large on this arm.
-        if !(0.7..1.4).contains(&(reached / size)) {
+        // Some effects cannot be made that large on this arm, or would be larger than any that occurs.
+        let too_large = case.table == Table::MeasuredArms && factor > LARGEST_FACTOR;
+        if too_large || !(0.7..1.4).contains(&(reached / size)) {
             return Ok(None);
         }
         let logs = self.with(&effect)?;
         let start = Instant::now();
-        let (to_fit, held_out) = logs.split_at(FIT.len());
+        let (to_fit, held_out) = logs.split_at(self.fitted);
         let explained = explain_body(&self.body, to_fit, held_out, &ExplainOptions::default())
             .map_err(|e| e.to_string())?;
         let seconds = start.elapsed().as_secs_f64();
@@ -122,7 +196,8 @@ impl Measured {
         let over = explained.after.validate.rms.iter().zip(before).map(|(a, b)| a / b).fold(0.0, f64::max);
         let joints: Vec<String> = effect.joints().iter().map(ToString::to_string).collect();
         let words = vec![format!("joint {}: {}", joints.join(","), effect.describe())];
-        Ok(Some(Outcome::new(case, words, vec![reached], &explained, &self.known, over, seconds)))
+        let outcome = Outcome::new(case, words, vec![reached], &explained, &self.known, over, seconds);
+        Ok(Some(Outcome { truth_joints: effect.joints(), ..outcome }))
     }
 
     /// The logs as they would be with an effect.
@@ -165,7 +240,7 @@ impl Measured {
     /// known, worst joint.
     fn visible(&self, logs: &[Log]) -> Result<f64, String> {
         let residual = |logs: &[Log]| -> Result<Signals, String> {
-            let data = Data::new(&self.body, &logs[..FIT.len()], &DataOptions::default())
+            let data = Data::new(&self.body, &logs[..self.fitted], &DataOptions::default())
                 .map_err(|e| e.to_string())?;
             Ok(fit(&data, &Folds::new(&data), &[], None).residual)
         };
@@ -181,4 +256,13 @@ impl Measured {
         });
         Ok(left.zip(&self.explained.after.fit.rms).map(|(l, r)| l / r).fold(0.0, f64::max))
     }
+}
+
+/// The rms of each joint's torque over all logs, N·m or N.
+fn usual(logs: &[Log]) -> Vec<f64> {
+    let joint = |j: usize| {
+        let samples = || logs.iter().flat_map(|log| log.torque[j].iter().filter(|tau| tau.is_finite()));
+        (samples().map(|tau| tau * tau).sum::<f64>() / samples().count().max(1) as f64).sqrt()
+    };
+    (0..logs.first().map_or(0, |log| log.torque.len())).map(joint).collect()
 }

@@ -20,8 +20,10 @@ mod tests;
 pub(crate) use benchmark::{Arguments as BenchmarkArguments, run as benchmark};
 use case::{Case, Table};
 use judge::Outcome;
+use measured::Measured;
 pub(crate) use probability::{Arguments as ProbabilityArguments, run as probability};
-use std::collections::HashSet;
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, HashSet};
 use std::fs::{self, OpenOptions};
 use std::io::Write as _;
 use std::ops::Range;
@@ -42,8 +44,8 @@ pub(crate) struct Arguments {
     /// The results, one line a case; cases that it holds are not run again
     #[arg(long, default_value = "target/study.jsonl")]
     results: PathBuf,
-    /// The folder of the measured UR10e logs, for the tables of injections
-    #[arg(long, default_value = "../shared/data/ur10e")]
+    /// The folder of the measured logs, for the tables of injections
+    #[arg(long, default_value = "../shared/data")]
     measured: PathBuf,
     /// Only make the tables of what the file of results holds
     #[arg(long)]
@@ -74,21 +76,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
             .map_err(|e| format!("{}: {e}", arguments.results.display()))?;
         let tables = if arguments.table.is_empty() { Table::all() } else { arguments.table.clone() };
         let bench = experiment::Bench::new()?;
-        let mut measured = None;
+        let mut measured = BTreeMap::new();
         for table in tables {
-            if table.measured() && measured.is_none() {
-                measured = measured::Measured::read(&arguments.measured)?;
-            }
             for case in Case::all(table, arguments.seeds.clone()) {
                 let wanted =
                     arguments.kind.is_empty() || arguments.kind.iter().any(|k| case.kinds.contains(k));
                 if !wanted || done.contains(&case.name()) {
                     continue;
                 }
-                let outcome = match (&measured, table.measured()) {
-                    (Some(measured), true) => measured.run(&case)?,
-                    (None, true) => None,
-                    (_, false) => bench.run(&case)?,
+                let outcome = if table.measured() {
+                    let key = (table == Table::MeasuredArms, case.folder);
+                    if let Entry::Vacant(place) = measured.entry(key) {
+                        place.insert(Measured::read(&arguments.measured, table, case.folder)?);
+                    }
+                    measured[&key].as_ref().map_or(Ok(None), |arm| arm.run(&case))?
+                } else {
+                    bench.run(&case)?
                 };
                 let Some(outcome) = outcome else { continue };
                 println!("{}", outcome.line());

@@ -1,5 +1,5 @@
-//! The probability of a name as a curve, fitted to one half of the drawn arms and judged on the other, and on
-//! the names of every other set of cases.
+//! The probability of a name as a curve, fitted to the names of all sets of cases, and judged on each set by
+//! the curve that is fitted to the others.
 //!
 //! Logistic regression on what `explain` knows of a name (D. R. Cox, "The regression analysis of binary
 //! sequences", 1958), by Newton's method with a small ridge.
@@ -8,6 +8,7 @@ use super::judge::{Named, Outcome};
 use super::reliability::wilson;
 use faer::Mat;
 use faer::linalg::solvers::Solve;
+use powerball::explanation::Rule;
 use powerball::explanation::explain::{Evidence, FEATURES};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -32,20 +33,17 @@ pub(crate) struct Arguments {
 }
 
 /// A name with what is known of it, and whether it is right.
+#[derive(Clone)]
 struct Case {
     evidence: Evidence,
     features: [f64; FEATURES],
-    unattributed: bool,
     right: bool,
 }
 
 const HEAD: &str = "set,case,effect,right,margin,alike,own_share,leftover,unattributed,fitted_time";
 
-/// The set to which the curve is fitted: effects on arms drawn by lot.
-const FITTED: &str = "drawn";
-
-/// Prints the curve that fits the names of every other drawn case, how it does on the others, and how the
-/// curve in use does on other sets.
+/// Prints the curve that fits all names, and how stated probabilities compare with how often names are right:
+/// by set, those of the curve in use and of a curve fitted to the other sets.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let failed = |e: std::io::Error| format!("{}: {e}", arguments.names.display());
     if let Some(results) = &arguments.results {
@@ -64,36 +62,20 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
         fs::write(&arguments.names, table.join("\n") + "\n").map_err(failed)?;
     }
     let text = fs::read_to_string(&arguments.names).map_err(failed)?;
-    let mut halves: [Vec<Case>; 2] = [Vec::new(), Vec::new()];
-    let mut others: BTreeMap<String, Vec<Case>> = BTreeMap::new();
-    let (mut last, mut half) = (String::new(), 0);
+    let mut sets: BTreeMap<String, Vec<Case>> = BTreeMap::new();
     for (k, line) in text.lines().enumerate().skip(1) {
-        let (set, name, case) =
+        let (set, case) =
             case(line).ok_or_else(|| format!("{}: line {}: no name", arguments.names.display(), k + 1))?;
-        if set != FITTED {
-            others.entry(set.to_string()).or_default().push(case);
-            continue;
-        }
-        // The names of one arm are of one half.
-        if name != last {
-            (half, last) = (1 - half, name.to_string());
-        }
-        halves[half].push(case);
+        sets.entry(set.to_string()).or_default().push(case);
     }
-    let [judge, fit] = halves;
-    print!("{}", curve(&fit, &judge));
-    let in_use = |case: &Case| case.evidence.probability();
-    for (set, cases) in &others {
-        println!("\nthe curve in use on the {} names of the set {set}:\n", cases.len());
-        print!("{}\nBrier score {:.4}\n", reliability(cases, &in_use), brier(cases, &in_use));
-    }
+    print!("{}", judged(&sets));
     Ok(())
 }
 
-/// The set of a case: what is put into measured logs is of one set at any size.
+/// The set of a case: its table, or the measured arm whose logs it is of.
 fn set(outcome: &Outcome) -> &str {
     match outcome.table.as_str() {
-        "measured-small" => "measured",
+        "measured-arms" => outcome.case.split('/').nth(2).unwrap_or_default(),
         table => table,
     }
 }
@@ -111,44 +93,53 @@ fn line(outcome: &Outcome, named: &Named) -> Option<String> {
     ))
 }
 
-/// The set and the case of a line, and what the curve reads of it.
-fn case(line: &str) -> Option<(&str, &str, Case)> {
+/// The set of a line, and what the curve reads of it.
+fn case(line: &str) -> Option<(&str, Case)> {
     let cells: Vec<&str> = line.split(',').collect();
-    let [set, name, _, right, margin, alike, _, leftover, unattributed, ..] = cells[..] else { return None };
-    let evidence =
-        Evidence { margin: margin.parse().ok()?, alike: alike == "1", leftover: leftover.parse().ok()? };
-    let [unattributed, right] = [unattributed, right].map(|flag| flag == "1");
-    Some((set, name, Case { evidence, features: evidence.features(), unattributed, right }))
+    let [set, _, _, right, margin, alike, _, leftover, _, time] = cells[..] else { return None };
+    let evidence = Evidence {
+        margin: margin.parse().ok()?,
+        alike: alike == "1",
+        leftover: leftover.parse().ok()?,
+        time: time.parse::<f64>().ok()? / Rule::default().least_time,
+    };
+    Some((set, Case { evidence, features: evidence.features(), right: right == "1" }))
 }
 
-/// The coefficients, and how the curve that they make does on names that were not fitted, compared with three
-/// constants and with one.
-fn curve(fit: &[Case], judge: &[Case]) -> String {
-    let coefficients = fitted(fit);
-    let mut out = format!("fitted to {} names: {coefficients:.3?}\n\n", fit.len());
-    let curve = |case: &Case| probability(&coefficients, &case.features);
-    out.push_str(&reliability(judge, &curve));
-    let _ = writeln!(
-        out,
-        "\n\
-         Brier score on the {} names that were not fitted: {:.4}; of the curve in use {:.4}; of three \
-         constants {:.4}; of one, the share of the other half, {:.4}",
-        judge.len(),
-        brier(judge, &curve),
-        brier(judge, &|case| case.evidence.probability()),
-        brier(judge, &constants),
-        brier(judge, &|_| share(fit))
+/// The coefficients, and how the curve does by set.
+fn judged(sets: &BTreeMap<String, Vec<Case>>) -> String {
+    let all: Vec<Case> = sets.values().flatten().cloned().collect();
+    let mut out = format!("fitted to {} names: {:.3?}\n\n", all.len(), fitted(&all));
+    out.push_str(
+        "| set | names | right | 95 % interval | stated by the curve in use | by one fitted to the other sets | \
+         Brier scores of these | of the others' share |\n|---|---|---|---|---|---|---|---|\n",
     );
-    out
-}
-
-/// What was stated before there was a curve.
-fn constants(case: &Case) -> f64 {
-    match case {
-        Case { evidence: Evidence { alike: true, .. }, .. } => 0.5,
-        Case { unattributed: true, .. } => 0.88,
-        _ => 0.97,
+    let mut left_out: Vec<(f64, bool)> = Vec::new();
+    for (set, cases) in sets {
+        let others: Vec<Case> =
+            sets.iter().filter(|(other, _)| *other != set).flat_map(|(_, c)| c.clone()).collect();
+        let coefficients = fitted(&others);
+        let curve = |case: &Case| probability(&coefficients, &case.features);
+        let in_use = |case: &Case| case.evidence.probability();
+        let right = cases.iter().filter(|case| case.right).count();
+        let [low, high] = wilson(right, cases.len()).map(|share| 100.0 * share);
+        let mean =
+            |curve: &dyn Fn(&Case) -> f64| 100.0 * cases.iter().map(curve).sum::<f64>() / cases.len() as f64;
+        let _ = writeln!(
+            out,
+            "| `{set}` | {} | {:.0} % | {low:.0} to {high:.0} % | {:.0} % | {:.0} % | {:.3}, {:.3} | {:.3} |",
+            cases.len(),
+            100.0 * share(cases),
+            mean(&in_use),
+            mean(&curve),
+            brier(cases, &in_use),
+            brier(cases, &curve),
+            brier(cases, &|_| share(&others))
+        );
+        left_out.extend(cases.iter().map(|case| (curve(case), case.right)));
     }
+    let _ = write!(out, "\nall sets, each by the curve fitted to the others:\n\n{}", reliability(left_out));
+    out
 }
 
 fn probability(coefficients: &[f64; FEATURES], features: &[f64; FEATURES]) -> f64 {
@@ -182,9 +173,8 @@ fn fitted(cases: &[Case]) -> [f64; FEATURES] {
     coefficients
 }
 
-/// Names in order of the curve's probability, in bins of equal size.
-fn reliability(cases: &[Case], curve: &dyn Fn(&Case) -> f64) -> String {
-    let mut sorted: Vec<(f64, bool)> = cases.iter().map(|case| (curve(case), case.right)).collect();
+/// Names with their probability and whether they are right, in order of it, in bins of equal size.
+fn reliability(mut sorted: Vec<(f64, bool)>) -> String {
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut out = String::from("| probability, mean | names | right | 95 % interval |\n|---|---|---|---|\n");
     let bins = (sorted.len() / BIN).clamp(1, 10);
@@ -230,8 +220,8 @@ mod tests {
             features.iter_mut().for_each(|x| *x = rng.random_range(-1.0..1.0));
             features[0] = 1.0;
             let right = rng.random_bool(probability(&truth, &features));
-            let evidence = Evidence { margin: 1.0, alike: false, leftover: 0.0 };
-            Case { evidence, features, unattributed: false, right }
+            let evidence = Evidence { margin: 1.0, alike: false, leftover: 0.0, time: 1.0 };
+            Case { evidence, features, right }
         };
         let cases: Vec<Case> = (0..4000).map(draw).collect();
         for (found, truth) in fitted(&cases).iter().zip(truth) {
@@ -239,5 +229,20 @@ mod tests {
         }
         let curve = |case: &Case| probability(&truth, &case.features);
         assert!(brier(&cases, &curve) < brier(&cases, &|_| share(&cases)));
+    }
+
+    /// A set whose names are right less often shows it by the curve of the others, which it did not shape.
+    #[test]
+    fn a_set_is_judged_by_the_curve_of_the_others() {
+        let evidence = Evidence { margin: 2.0, alike: false, leftover: 0.1, time: 1.0 };
+        let names = |right: usize| -> Vec<Case> {
+            (0..100).map(|k| Case { evidence, features: evidence.features(), right: k < right }).collect()
+        };
+        let sets = BTreeMap::from([("easy", 90), ("hard", 40)].map(|(set, n)| (set.to_string(), names(n))));
+        let table = judged(&sets);
+        let line = |set: &str| table.lines().find(|l| l.contains(set)).unwrap_or_default().to_string();
+        let cells = |set: &str| line(set).split('|').map(|c| c.trim().to_string()).collect::<Vec<_>>();
+        assert_eq!((cells("easy")[3].as_str(), cells("hard")[3].as_str()), ("90 %", "40 %"));
+        assert_eq!((cells("easy")[6].as_str(), cells("hard")[6].as_str()), ("40 %", "90 %"));
     }
 }

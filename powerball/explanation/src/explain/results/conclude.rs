@@ -50,8 +50,9 @@ pub(crate) fn conclude(findings: Findings<'_>) -> Result<Explained, ExplainError
     let (unattributed, unexplained, dependencies) =
         unattributed(study, model, history, &floor, &after, &named);
     let left = unattributed.as_ref().map_or(&[][..], |rest| &rest.joints);
+    let time = study.fitted_time() / study.rule().least_time;
     for effect in &mut named {
-        effect.probability = Evidence::of(effect).probability();
+        effect.probability = Evidence::of(effect, time).probability();
     }
     let open = open(study, model, history, left);
     let held_out_change = changes(&study.validation, &before.residual, &held_out);

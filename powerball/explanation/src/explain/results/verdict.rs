@@ -241,7 +241,7 @@ fn is_named(explained: &Explained, name: &str, joints: &[JointNumber]) -> bool {
     explained.effects.iter().any(|effect| effect.is(name, joints))
 }
 
-// How often a name with such evidence is right: a curve that was fitted to arms whose effects are known.
+// How often a name with such evidence is right: a curve that was fitted to logs whose effects are known.
 
 /// The evidence for a name: features that predict how often such a name is right.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -252,35 +252,40 @@ pub struct Evidence {
     pub alike: bool,
     /// Share of the excess over noise that stays on its joints.
     pub leftover: f64,
+    /// Time of motion in the fitted logs over [`least_time`](crate::rule::Rule::least_time).
+    pub time: f64,
 }
 
 /// Numbers that the logit of the probability is linear in.
-pub const FEATURES: usize = 4;
+pub const FEATURES: usize = 5;
 
 /// Weights of the features: logistic regression (D. R. Cox, "The regression analysis of binary sequences",
-/// 1958) on one half of drawn arms, judged on the other half. `cargo run --release -p xtask -- probability`
-/// fits them again.
-const COEFFICIENTS: [f64; FEATURES] = [1.74, 2.36, 1.81, -2.71];
+/// 1958) on effects of simulated arms and on effects put into measured logs.
+/// `cargo run --release -p xtask -- probability` fits them again, and judges them by set.
+const COEFFICIENTS: [f64; FEATURES] = [1.91, 4.04, 1.83, -3.29, 3.26];
 
-/// A larger margin says no more.
+/// A larger margin says no more, nor does a margin or a time below its inverse. Below a margin of 1 another
+/// name fits better: a class with a small margin is right far less often than one with a margin of 1.
 const LARGEST_MARGIN: f64 = 20.0;
 /// Some hundred names cannot speak of less than one in a hundred.
 const SUREST: f64 = 0.99;
 
 impl Evidence {
-    /// The evidence for a name that was given.
-    pub(super) fn of(effect: &NamedEffect) -> Evidence {
+    /// The evidence for a name that was given by logs with this time of motion over the least one.
+    pub(super) fn of(effect: &NamedEffect, time: f64) -> Evidence {
         let alike = effect.rivals.iter().any(|rival| rival.alike);
-        Evidence { margin: effect.margin, alike, leftover: effect.leftover }
+        Evidence { margin: effect.margin, alike, leftover: effect.leftover, time }
     }
 
-    /// 1, whether another name fits as well, the logarithm of the margin, and the remaining share.
+    /// 1, whether another name fits as well, the logarithm of the margin, the remaining share, and the
+    /// logarithm of the time if it is less than the least.
     #[must_use]
     pub fn features(&self) -> [f64; FEATURES] {
-        let margin = within(self.margin, [1.0, LARGEST_MARGIN]).ln();
+        let margin = within(self.margin, [1.0 / LARGEST_MARGIN, LARGEST_MARGIN]).ln();
         // By what is gone, since what is not a number counts as the lower end.
         let leftover = 1.0 - within(1.0 - self.leftover, [0.0, 1.0]);
-        [1.0, f64::from(u8::from(self.alike)), margin, leftover]
+        let time = within(self.time, [1.0 / LARGEST_MARGIN, 1.0]).ln();
+        [1.0, f64::from(u8::from(self.alike)), margin, leftover, time]
     }
 
     /// Probability that such a name is right, or that one of them is, if another one fits as well.
@@ -301,21 +306,25 @@ fn within(x: f64, [low, high]: [f64; 2]) -> f64 {
 mod probability_tests {
     use super::*;
 
-    const CLEAR: Evidence = Evidence { margin: 5.0, alike: false, leftover: 0.02 };
+    const CLEAR: Evidence = Evidence { margin: 5.0, alike: false, leftover: 0.02, time: 2.0 };
 
     #[test]
     fn less_evidence_makes_no_name_more_probable() {
         let sure = CLEAR.probability();
         assert!(sure > 0.9 && sure <= SUREST, "{sure}");
-        for worse in [Evidence { margin: 1.05, ..CLEAR }, Evidence { leftover: 0.6, ..CLEAR }] {
+        let short = Evidence { time: 0.3, ..CLEAR };
+        for worse in [Evidence { margin: 1.05, ..CLEAR }, Evidence { leftover: 0.6, ..CLEAR }, short] {
             assert!(worse.probability() < sure, "{worse:?}: {} against {sure}", worse.probability());
         }
+        let class = Evidence { margin: 1.0, alike: true, ..CLEAR };
+        let second = Evidence { margin: 0.2, ..class };
+        assert!(second.probability() < class.probability(), "a name that others fit far better");
     }
 
     #[test]
     fn what_is_no_number_is_no_evidence() {
-        let nothing = Evidence { margin: f64::NAN, leftover: f64::NAN, ..CLEAR };
-        let least = Evidence { margin: 1.0, leftover: 1.0, ..CLEAR };
+        let nothing = Evidence { margin: f64::NAN, leftover: f64::NAN, time: f64::NAN, ..CLEAR };
+        let least = Evidence { margin: 0.0, leftover: 1.0, time: 0.0, ..CLEAR };
         assert_eq!(nothing.probability(), least.probability());
         let endless = Evidence { margin: f64::INFINITY, ..CLEAR };
         assert!(endless.probability() >= CLEAR.probability());
