@@ -35,6 +35,7 @@ fn demo() -> (&'static Value, PathBuf) {
     static SAID: OnceLock<Value> = OnceLock::new();
     let folder = scratch("demo");
     let said = SAID.get_or_init(|| {
+        let _ = std::fs::remove_dir_all(&folder);
         let run = powerball(&["demo", "--out", folder.to_str().unwrap(), "--json"]);
         assert!(run.status.success(), "{}", complaint(&run));
         json(&run)
@@ -114,7 +115,8 @@ fn the_demo_finds_what_it_hid_and_writes_what_it_promises() {
 /// but its files.
 #[test]
 fn an_experiment_decides_what_logs_leave_open() {
-    let folder = scratch("demo_experiment");
+    let (folder, again) = (scratch("demo_experiment"), scratch("demo_experiment_again"));
+    [&folder, &again].into_iter().for_each(|old| drop(std::fs::remove_dir_all(old)));
     let demo = folder.to_str().unwrap();
     let run = powerball(&["demo", "--effect", "asymmetry", "--seed", "3", "--out", demo, "--json"]);
     assert!(run.status.success(), "{}", complaint(&run));
@@ -123,7 +125,6 @@ fn an_experiment_decides_what_logs_leave_open() {
     assert_eq!(next["to_tell_apart"], serde_json::json!(["asymmetry", "spring"]), "{next}");
     assert!(folder.join("virtual_arm.json").is_file());
 
-    let again = scratch("demo_experiment_again");
     let file = |name: String| folder.join(name).to_str().unwrap().to_string();
     let logs: Vec<String> = (1..=5).map(|k| file(format!("fit_{k}.csv"))).collect();
     let held_out: Vec<String> = (1..=3).map(|k| file(format!("held_out_{k}.csv"))).collect();

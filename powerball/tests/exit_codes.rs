@@ -128,6 +128,47 @@ fn files_of_others_are_not_written_over() {
     assert_eq!(code(&powerball(&folder, &format!("{to} b.csv --force"))), 0);
     assert!(std::fs::read_to_string(folder.join("b.csv")).unwrap().lines().count() > 4000);
 
+    // A page that another command made stays, and no input is written over, also with --force.
+    let refused = powerball(&folder, "compare result result --out result");
+    assert!(code(&refused) == 2 && said(&refused).contains("report.html"), "{}", said(&refused));
+    let model = std::fs::read_to_string(folder.join("result/identified.json")).unwrap();
+    let over = "generate --arm arm.toml --model result/identified.json -o result/identified.json --force";
+    let refused = powerball(&folder, over);
+    assert!(code(&refused) == 2 && said(&refused).contains("is also an input"), "{}", said(&refused));
+    kept("result/identified.json", &model);
+
+    // Values that somebody gave are no result, even under all of its names.
+    let values = std::fs::read_to_string(folder.join("result/consistent.json")).unwrap();
+    std::fs::write(folder.join("values.json"), &values).unwrap();
+    let near = "consistent --arm arm.toml --values values.json --out near.json";
+    assert_eq!(code(&powerball(&folder, near)), 0);
+    assert_eq!(code(&powerball(&folder, near)), 0);
+    let mine = values.replace('\n', "");
+    std::fs::write(folder.join("near.json"), &mine).unwrap();
+    assert_eq!(code(&powerball(&folder, near)), 2);
+    kept("near.json", &mine);
+
+    // Commands that write many files look at all of them before they begin.
+    for (command, file) in [
+        ("demo", "arm.toml"),
+        ("demo", "fit_2.csv"),
+        ("warm-up", "warm_up.csv"),
+        ("warm-up", "warm_up.json"),
+        ("friction", "friction_3.csv"),
+        ("friction", "friction.json"),
+        ("log a.csv --arm arm.toml --to mcap", "a.foxglove.json"),
+    ] {
+        let out = folder.join("many");
+        let _ = std::fs::remove_dir_all(&out);
+        std::fs::create_dir_all(&out).unwrap();
+        std::fs::write(out.join(file), "mine").unwrap();
+        let target = if command.starts_with("log") { "-o many/a.mcap" } else { "--out many" };
+        let refused = powerball(&folder, &format!("{command} {target}"));
+        assert!(code(&refused) == 2 && said(&refused).contains(file), "{command}: {}", said(&refused));
+        kept(&format!("many/{file}"), "mine");
+        assert_eq!(std::fs::read_dir(&out).unwrap().count(), 1, "{command}");
+    }
+
     // Generated code is replaced, other code is not.
     let generate = "generate --arm arm.toml --model result/identified.json -o model.rs";
     assert_eq!(code(&powerball(&folder, generate)), 0);

@@ -28,6 +28,12 @@ fn file(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("follow").join(name)
 }
 
+/// A folder without what an earlier test left in it: a log of a run that was stopped is not replaced.
+fn fresh(name: &str) -> PathBuf {
+    let _ = std::fs::remove_dir_all(file(name));
+    file(name)
+}
+
 fn write(name: &str, text: &str) -> String {
     std::fs::create_dir_all(file("")).unwrap();
     std::fs::write(file(name), text).unwrap();
@@ -59,7 +65,7 @@ fn path(name: &str, seconds: f64) -> String {
 #[test]
 fn the_explained_model_follows_better_than_the_base_model() {
     let (model, plant) = (write("model.json", &model().to_string()), write("plant.json", PLANT));
-    let (path, out) = (path("path.csv", 4.0), file("out"));
+    let (path, out) = (path("path.csv", 4.0), fresh("out"));
     let run = powerball(&[
         "follow",
         "--trajectory",
@@ -111,7 +117,7 @@ fn a_run_that_is_stopped_keeps_its_log() {
     let push = r#"{"effect": {"contact_wrench": {"force": [0.0, 60.0, -60.0], "start": 0.0, "length": 1.0, "every": 2.0}}, "age": 0.0}"#;
     let (plant, path) = (write("push_plant.json", push), path("pushed.csv", 4.0));
     for with in ["torque", "impedance"] {
-        let out = file(&format!("pushed_{with}"));
+        let out = fresh(&format!("pushed_{with}"));
         let arguments = [
             "follow",
             "--trajectory",

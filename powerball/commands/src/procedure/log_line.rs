@@ -48,7 +48,7 @@ pub enum Columns {
 
 impl Columns {
     /// The first line of a log of `n` joints.
-    pub(super) fn header(self, n: usize) -> String {
+    pub(crate) fn header(self, n: usize) -> String {
         let (joint, once): (&[&str], &[&str]) = match self {
             Columns::Torques => (&["q", "tau"], &[]),
             Columns::Everything => {

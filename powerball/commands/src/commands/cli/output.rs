@@ -108,6 +108,14 @@ pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
     files::make_folder(folder).map_err(Failure::Unusable)
 }
 
+/// As [`make_folder`], for a command whose results are many files: refused where one of these names is there
+/// and no page of this command.
+#[cfg(feature = "cli")]
+pub(crate) fn make_own_folder(folder: &Path, names: &[&str]) -> Result<(), Failure> {
+    replace::check_own_folder(folder, names)?;
+    make_folder(folder)
+}
+
 /// Writes a file of a folder whole or not at all: a reader never sees half of it.
 pub(crate) fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Failure> {
     write_file(&folder.join(name), bytes)

@@ -1,12 +1,14 @@
-//! Which files a command may replace: those that the same command made, and others with `--force`.
+//! Which files a command may replace: those that the same command made, and others with `--force`. A file
+//! that the command line names as an input is never replaced.
 //!
-//! A page names in its head or its foot the program that made it; a JSON object is recognised by the keys of
-//! its result, any other text by its first line, which is its header. A log is never recognised: it may be
-//! the only one of its kind.
+//! A page names in its foot the command that made it; a JSON object is recognised by the keys of its result,
+//! any other text by its first line, which is its header. A log is never recognised: it may be the only one
+//! of its kind.
 
-use super::Failure;
+use super::{Cli, Failure};
+use clap::CommandFactory;
 use serde_json::Value;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Text in every file that `powerball export` writes for a simulator.
@@ -21,7 +23,7 @@ pub(super) fn replace_all() {
 }
 
 /// Results by name, with a key that no other file of this name has; of flat values all are numbers.
-const RESULTS: [(&str, &str); 9] = [
+const RESULTS: [(&str, &str); 11] = [
     ("identified.json", "friction"),
     ("explained.json", "verdict"),
     ("model.json", "parameters"),
@@ -30,6 +32,8 @@ const RESULTS: [(&str, &str); 9] = [
     ("verified.json", "joints"),
     ("follow.json", "tracking_error"),
     ("log.json", "files"),
+    ("friction.json", "joints"),
+    ("warm_up.json", "warm"),
     ("consistent.json", ""),
 ];
 
@@ -41,30 +45,71 @@ pub(super) fn check_folder(folder: &Path) -> Result<(), Failure> {
     names.try_for_each(|name| check(&folder.join(name), None))
 }
 
+/// Refuses a folder in which files begin with these names and no page is of this command, before anything is
+/// computed: for results that are many files, of which most are not recognised.
+#[cfg(feature = "cli")]
+pub(super) fn check_own_folder(folder: &Path, names: &[&str]) -> Result<(), Failure> {
+    let page = std::fs::read(folder.join("report.html"));
+    if FORCE.load(Ordering::Relaxed) || page.is_ok_and(|page| is_page_of(own().as_deref(), &page)) {
+        return Ok(());
+    }
+    let files = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let named = |file: &PathBuf| {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        names.iter().any(|begin| name.starts_with(begin))
+    };
+    files.filter(|file| file.is_file()).find(named).map_or(Ok(()), |file| Err(refused(&file)))
+}
+
 /// Refuses to replace a file that is not of the kind of `new`; without it by its name alone.
 pub(super) fn check(target: &Path, new: Option<&[u8]>) -> Result<(), Failure> {
     // A pipe or a terminal holds nothing that could be lost.
-    if FORCE.load(Ordering::Relaxed) || !target.is_file() {
+    if !target.is_file() {
+        return Ok(());
+    }
+    check_input(target)?;
+    if FORCE.load(Ordering::Relaxed) {
         return Ok(());
     }
     // A file that cannot be read gives an error when it is written.
     let Ok(old) = std::fs::read(target) else { return Ok(()) };
-    match old.is_empty() || is_alike(target, &old, new) {
+    match old.is_empty() || is_alike(target, &old, new, own().as_deref()) {
         true => Ok(()),
         false => Err(refused(target)),
     }
 }
 
-/// Refuses to replace any file by a log, and always those that it is made of.
-pub(super) fn check_log(target: &Path, inputs: &[&Path]) -> Result<(), Failure> {
-    let same =
-        |input: &&Path| matches!((input.canonicalize(), target.canonicalize()), (Ok(a), Ok(b)) if a == b);
-    if inputs.iter().any(same) {
-        let reason = format!("{}: is also an input: choose another file", target.display());
-        return Err(Failure::Unusable(reason));
-    }
+/// Refuses to replace any file by a log.
+pub(super) fn check_log(target: &Path) -> Result<(), Failure> {
+    check_input(target)?;
     match target.is_file() && !FORCE.load(Ordering::Relaxed) {
         true => Err(refused(target)),
+        false => Ok(()),
+    }
+}
+
+/// Options after which a file of the command line is no input.
+const OUTPUTS: [&str; 6] = ["-o", "--output", "--out", "--report", "--yaml", "--c-header"];
+
+/// Refuses a file that the command line names as an input, also with `--force`.
+fn check_input(target: &Path) -> Result<(), Failure> {
+    let words: Vec<String> = std::env::args().collect();
+    let Ok(target_path) = target.canonicalize() else { return Ok(()) };
+    let is_target = |word: &str| Path::new(word).canonicalize().is_ok_and(|path| path == target_path);
+    let input = words.windows(2).any(|pair| {
+        let value = pair[1].strip_prefix("--").and_then(|option| option.split_once('='));
+        match value {
+            Some((option, value)) => {
+                !OUTPUTS.iter().any(|o| o.strip_prefix("--") == Some(option)) && is_target(value)
+            }
+            None => !OUTPUTS.contains(&pair[0].as_str()) && is_target(&pair[1]),
+        }
+    });
+    match input {
+        true => {
+            let reason = format!("{}: is also an input: choose another file", target.display());
+            Err(Failure::Unusable(reason))
+        }
         false => Ok(()),
     }
 }
@@ -76,22 +121,46 @@ fn refused(target: &Path) -> Failure {
     ))
 }
 
-fn is_alike(target: &Path, old: &[u8], new: Option<&[u8]>) -> bool {
+/// The name of the command that this process runs.
+fn own() -> Option<String> {
+    command(std::env::args())
+}
+
+/// Whether a page is of the command with this name, as its foot says.
+fn is_page_of(own: Option<&str>, page: &[u8]) -> bool {
+    let page = String::from_utf8_lossy(page);
+    let foot = page.rsplit_once(" UTC, powerball ").map(|(_, foot)| foot);
+    let made = foot.and_then(|foot| command(foot.split(['<', ' ']).map(str::to_string)));
+    made.is_some() && made.as_deref() == own
+}
+
+/// The command's name among the words of a command line.
+fn command(mut words: impl Iterator<Item = String>) -> Option<String> {
+    let cli = Cli::command();
+    words.find(|word| cli.get_subcommands().any(|known| known.get_name() == word.as_str()))
+}
+
+/// Whether a text is as this program writes the object.
+fn is_own_layout(object: &serde_json::Map<String, Value>, text: &[u8]) -> bool {
+    crate::report::files::json(object).is_ok_and(|own| own.as_bytes() == text)
+}
+
+fn is_alike(target: &Path, old: &[u8], new: Option<&[u8]>, own_command: Option<&str>) -> bool {
     let name = target.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let object = |bytes: &[u8]| match serde_json::from_slice(bytes) {
         Ok(Value::Object(object)) => Some(object),
         _ => None,
     };
     if name.ends_with(".html") {
-        let page = String::from_utf8_lossy(old);
-        return page.contains(crate::report::MADE_BY) || page.contains(" UTC, powerball ");
+        return is_page_of(own_command, old);
     }
     if let Some(own) = object(old) {
         let flat = |object: &serde_json::Map<String, Value>| object.values().all(Value::is_number);
         return match (RESULTS.iter().find(|(known, _)| *known == name), new.and_then(object)) {
             (Some((_, "")), _) => flat(&own),
             (Some((_, key)), _) => own.contains_key(*key),
-            (None, Some(new)) => flat(&own) == flat(&new) && (flat(&new) || own.keys().eq(new.keys())),
+            // Values are also what others give to this command: its own have its layout too.
+            (None, Some(new)) => own.keys().eq(new.keys()) && (!flat(&new) || is_own_layout(&own, old)),
             (None, None) => false,
         };
     }
@@ -113,15 +182,21 @@ mod tests {
 
     #[test]
     fn a_file_is_replaced_by_one_of_its_kind() {
-        let page = format!("<!doctype html>{}<title>x</title>", crate::report::MADE_BY);
+        let page = |by: &str| format!("<!doctype html><footer>1 UTC, powerball 0.1.0: {by} --out x</footer>");
+        let identify = page("powerball --quiet identify");
+        let compare = page("powerball compare");
+        let values = "{\n  \"m1\": 1.5,\n  \"m2\": 1.0\n}";
         for (name, old, new, alike) in [
-            ("report.html", page.as_str(), "", true),
+            ("report.html", identify.as_str(), "", true),
+            ("report.html", compare.as_str(), "", false),
             ("report.html", "<!doctype html><title>my report</title>", "", false),
             ("identified.json", "{\"friction\": []}", "", true),
             ("identified.json", "{\"notes\": 1}", "", false),
             ("identified.json", "my notes", "", false),
             ("consistent.json", "{\"m1\": 1.5}", "", true),
-            ("near.json", "{\"m1\": 1.5}", "{\"m1\": 2.0, \"m2\": 1}", true),
+            ("near.json", values, "{\"m1\": 2.0, \"m2\": 1}", true),
+            ("near.json", values, "{\"m1\": 2.0, \"mx1\": 1}", false),
+            ("near.json", "{\"m1\": 1.5, \"m2\": 1.0}", "{\"m1\": 2.0, \"m2\": 1}", false),
             ("near.json", "{\"m1\": \"mine\"}", "{\"m1\": 2.0}", false),
             ("path.csv", "t,q1\n0,1\n", "t,q1\n0,2\n", true),
             ("path.csv", "t,q1,tau1\n0,1,2\n", "t,q1\n0,2\n", false),
@@ -135,7 +210,7 @@ mod tests {
             ("a.sdf", "<?xml?>", "<?xml?><!-- written by powerball export, 2 -->", false),
         ] {
             assert_eq!(
-                is_alike(Path::new(name), old.as_bytes(), Some(new.as_bytes())),
+                is_alike(Path::new(name), old.as_bytes(), Some(new.as_bytes()), Some("identify")),
                 alike,
                 "{name}: {old}"
             );

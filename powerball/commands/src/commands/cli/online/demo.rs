@@ -9,6 +9,20 @@ use serde_json::json;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
+/// What the names of the files begin with that the command writes.
+const FILES: [&str; 10] = [
+    "arm.toml",
+    "virtual_arm.json",
+    "base.json",
+    "fit_",
+    "held_out_",
+    "experiment.csv",
+    "path.csv",
+    "model.json",
+    "explained.json",
+    "follow.json",
+];
+
 /// Record a virtual arm with an effect that the model does not know about, identify, explain, and compare
 /// with the truth.
 ///
@@ -40,7 +54,7 @@ pub(crate) struct DemoCommand {
 impl DemoCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let progress = Progress::new();
-        output::make_folder(&self.out)?;
+        output::make_own_folder(&self.out, &FILES)?;
         let started = std::time::Instant::now();
         let demo = demo::run(
             &self.out,

@@ -5,6 +5,7 @@ use super::bus::{Consent, Where, virtual_bus};
 use super::inputs::Inputs;
 use super::motion::live;
 use super::output::Progress;
+use super::replace;
 use crate::procedure::{Envelope, RecordError, record};
 use clap::Args;
 use dyngen::Arm;
@@ -16,6 +17,9 @@ use powerball_logs::log::{Log, read_logs};
 use powerball_logs::motion::Motion;
 use powerball_virtual_arm::Undeclared;
 use std::path::{Path, PathBuf};
+
+/// The file of the experiment's log, in the folder of the results.
+const LOG: &str = "experiment.csv";
 
 /// Said where an experiment has nothing to tell apart.
 const NOTHING_OPEN: &str = "--experiment: nothing was recorded: these logs leave no names open that a path \
@@ -59,6 +63,7 @@ impl Experiment {
         if !self.experiment {
             return Ok(None);
         }
+        replace::check_own_folder(&inputs.out, &[LOG])?;
         let place = Where { bus: self.bus.clone(), json: inputs.json };
         let (bus, note) = self.arm(&inputs.arm, &place)?;
         Ok(Some(Opened { bus, place, consent: self.consent, note }))
@@ -96,7 +101,7 @@ impl Opened {
     ) -> Result<(Vec<Log>, Vec<String>), Failure> {
         let Some(motion) = motion else { return Ok((Vec::new(), vec![NOTHING_OPEN.to_string()])) };
         progress.say("recording the experiment");
-        let file = out.join("experiment.csv");
+        let file = out.join(LOG);
         let note = self.note.clone();
         self.record(motion, arm, &file)?;
         let (new, findings) = read_logs(&[&file], arm).map_err(|e| Failure::Refused(e.to_string()))?;

@@ -3,12 +3,12 @@
 use super::bus::{Consent, Where, virtual_bus};
 use super::envelope::Surroundings;
 use super::output::{self, Progress};
-use super::{Failure, motion};
+use super::{Failure, motion, replace};
 use crate::procedure::friction::{
     Experiment, FrictionError, JointFriction, analyse, is_complete, log_file, plan, run,
 };
 use crate::procedure::gravity_free;
-use crate::procedure::{RecordError, Recorder};
+use crate::procedure::{Columns, RecordError, Recorder};
 use crate::report::{Figure, Ink, Page, Panel, Series, Table, number};
 use clap::Args;
 use dyngen::Model;
@@ -66,8 +66,11 @@ impl Friction {
         }
         progress.say("deriving the arm");
         let model = Model::derive(arm).map_err(|e| Failure::Refused(e.to_string()))?;
-        std::fs::create_dir_all(&self.out)
-            .map_err(|e| Failure::Unusable(format!("{}: cannot be made: {e}", self.out.display())))?;
+        output::make_folder(&self.out)?;
+        for joint in wanted.iter().map(|j| j - 1) {
+            let header = Columns::Everything.header(n);
+            replace::check(&log_file(&self.out, joint), Some(header.as_bytes()))?;
+        }
         let (experiments, notes) = self.plan(&model, &wanted)?;
         self.record(&model, &experiments, &progress)?;
         let mut found = Vec::new();

@@ -17,7 +17,7 @@ pub(super) fn live<T: std::fmt::Display>() -> impl FnMut(&T) {
 
 /// Begins the log of a motion in a folder for results.
 pub(super) fn motion_log(folder: &Path) -> Result<MotionLog, Failure> {
-    output::make_folder(folder)?;
+    output::make_own_folder(folder, &["log.csv"])?;
     let file = folder.join("log.csv");
     MotionLog::create(&file)
         .map_err(|e| Failure::Unusable(format!("{}: cannot be written: {e}", file.display())))

@@ -4,8 +4,9 @@ use super::Failure;
 use super::bus::{Consent, Where, virtual_bus};
 use super::envelope::Surroundings;
 use super::output::{self, Progress};
+use super::replace;
 use crate::procedure::warm_up::{Seen, WarmUpSettings, Warmth, swing, warm_up};
-use crate::procedure::{Behind, RecordError, Recorder, resume};
+use crate::procedure::{Behind, Columns, RecordError, Recorder, resume};
 use crate::report::{Figure, Ink, Page, Panel, Series};
 use clap::Args;
 use powerball_bus::driver::lwa4p::LWA4P;
@@ -54,8 +55,7 @@ pub(crate) struct WarmUp {
 impl WarmUp {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let settings = self.settings()?;
-        std::fs::create_dir_all(&self.out)
-            .map_err(|e| Failure::Unusable(format!("{}: cannot be made: {e}", self.out.display())))?;
+        output::make_folder(&self.out)?;
         let progress = Progress::new();
         let refused = |e: RecordError| Failure::Refused(e.to_string());
         let envelope = self.surroundings.envelope(&self.surroundings.arm()?, &self.mounting)?;
@@ -63,6 +63,7 @@ impl WarmUp {
         let path = self.out.join("warm_up.csv");
         let unwritable =
             |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", path.display()));
+        replace::check(&path, Some(Columns::Everything.header(LWA4P.joints.len()).as_bytes()))?;
         let (seen, start) = self.earlier(&settings);
         let log = match start > 0.0 {
             true => resume::append(&path).map_err(unwritable)?,
