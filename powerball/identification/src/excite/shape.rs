@@ -5,8 +5,9 @@
 //! from the base to the last frame (and the tool). Every part of it that has a length is a capsule. An arm
 //! file has no more of a shape: the radius and the clearance account for thick joints and cables.
 //!
-//! The bars of a parallelogram on one joint are capsules between their pins in the plane of that joint's frame.
-//! How far along the joint's axis they are is not in the file: so they are compared with the floor alone.
+//! The bars of a parallelogram on one joint are capsules between their pins, in the plane of that joint's
+//! frame. How far along the joint's axis they are is not in the file: so they are compared with the floor
+//! alone.
 
 use super::constraints::{JointLimits, Segment};
 use chacha20::ChaCha8Rng;
@@ -441,7 +442,8 @@ acceleration = 3
         }
     }
 
-    /// A crank and a rod under the base hang as low as two circles about the ends of the bars say.
+    /// The pins of a loop are as far apart as its file says, in the plane of its joint, and the lowest point
+    /// is what is nearest to a floor.
     #[test]
     fn bars_are_above_the_floor() {
         for (convention, rows) in [
@@ -456,12 +458,14 @@ acceleration = 3
         ] {
             let joint = |row: &str| {
                 format!(
-                    "[[joint]]\nkind = \"revolute\"\n{row}\nposition = [-1, 1]\nvelocity = 1\nacceleration = 3\n"
+                    "[[joint]]\nkind = \"revolute\"\n{row}\nposition = [-1, 1]\nvelocity = 1\n\
+                     acceleration = 3\n"
                 )
             };
             let text = format!(
-                "name = \"bars\"\nconvention = \"{convention}\"\ngravity = [0, 0, -9.81]\n{}{}[[loop]]\njoints = [2, \"a\", \"b\", \"c\"]\n\
-                 lengths = [0.2, 0.5, 0.2, 0.5]\ninner = \"pi\"\nouter = 2.5\n[tool]\nxyz = [0.1, 0, 0]\nrpy = [0, 0, 0]\n",
+                "name = \"bars\"\nconvention = \"{convention}\"\ngravity = [0, 0, -9.81]\n{}{}\
+                 [[loop]]\njoints = [2, \"a\", \"b\", \"c\"]\nlengths = [0.2, 0.5, 0.2, 0.5]\ninner = \"pi\"\n\
+                 outer = 2.5\n[tool]\nxyz = [0.1, 0, 0]\nrpy = [0, 0, 0]\n",
                 joint(rows[0]),
                 joint(rows[1])
             );
@@ -478,13 +482,13 @@ acceleration = 3
                 {
                     approx::assert_abs_diff_eq!((a - b).norm(), length, epsilon = 1e-12);
                 }
-                // All four are in the plane of the joint, at right angles to its axis, which both q turn about.
+                // All four are in one plane, at right angles to the joint's axis.
                 let turned = shape.vertices(&[q[0], q[1] + 0.3]);
                 let axis = (turned[6] - joint).cross(&(outer - joint)).normalize();
                 for pin in pins {
                     approx::assert_abs_diff_eq!((pin - joint).dot(&axis), 0.0, epsilon = 1e-12);
                 }
-                // The inner pin does not turn with the joint, and the crank turns as the outer link.
+                // The inner pin does not turn with the joint.
                 approx::assert_abs_diff_eq!(turned[8], inner, epsilon = 1e-12);
                 let up = (joint - middle).normalize();
                 let floor = Floor { up, height: middle.dot(&up) + 1.0, moving: vec![true; vertices.len()] };
