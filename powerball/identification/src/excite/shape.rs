@@ -4,11 +4,15 @@
 //! The origins of the frames, and the corners between the parts of length d and a of each row, are a polyline
 //! from the base to the last frame (and the tool). Every part of it that has a length is a capsule. An arm
 //! file has no more of a shape: the radius and the clearance account for thick joints and cables.
+//!
+//! The bars of a parallelogram on one joint are capsules between their pins, in the plane of that joint's
+//! frame. How far along the joint's axis they are is not in the file: so they are compared with the floor
+//! alone.
 
 use super::constraints::{JointLimits, Segment};
 use chacha20::ChaCha8Rng;
 use dyngen::Arm;
-use dyngen::arm::{Convention, Joint, JointKind};
+use dyngen::arm::{Bar, Convention, Joint, JointKind};
 use dyngen::exact::rational::to_f64;
 use nalgebra::{Rotation3, Vector3};
 use powerball_logs::chain::Chain;
@@ -28,6 +32,8 @@ pub enum Contact {
     Links(usize, usize),
     /// A link and the floor.
     Floor(usize),
+    /// A bar of a closed loop, from 1 in the order of the arm, and the floor.
+    BarFloor(usize),
 }
 
 impl fmt::Display for Contact {
@@ -36,6 +42,7 @@ impl fmt::Display for Contact {
         match self {
             Contact::Links(a, b) => write!(f, "{} and {}", name(a), name(b)),
             Contact::Floor(link) => write!(f, "{} and the floor", name(link)),
+            Contact::BarFloor(bar) => write!(f, "bar {bar} of the closed loops and the floor"),
         }
     }
 }
@@ -57,6 +64,18 @@ struct Part {
     link: usize,
 }
 
+/// The rod and the crank of a parallelogram on one joint.
+#[derive(Clone, Debug)]
+struct Rods {
+    /// The rod's number among the bars, from 1; the crank's is the next.
+    number: usize,
+    /// The vertex at the joint.
+    joint: usize,
+    /// The pins on the link behind the joint and on the one before it: the link, from 0, or the base, and the
+    /// pin in its frame, m.
+    pins: [(Option<usize>, Vector3<f64>); 2],
+}
+
 /// The capsules of an arm.
 #[derive(Clone, Debug)]
 pub struct Shape {
@@ -66,6 +85,9 @@ pub struct Shape {
     tool: Option<Vector3<f64>>,
     radius: f64,
     parts: Vec<Part>,
+    rods: Vec<Rods>,
+    /// What may touch the floor with an end at a vertex.
+    ends: Vec<(Contact, usize)>,
     pairs: Vec<(usize, usize)>,
     always: Vec<(usize, usize)>,
 }
@@ -115,6 +137,15 @@ impl Shape {
             false => Rotation3::from_axis_angle(&Vector3::x_axis(), -joint.alpha.radians()) * normal(joint),
         };
         let across = arm.joints.iter().map(across).collect();
+        let rods = rods(arm, modified);
+        let ends = parts.iter().flat_map(|part| [0, 1].map(|k| (Contact::Floor(part.link), part.vertex + k)));
+        let mut ends: Vec<(Contact, usize)> = ends.collect();
+        // Their three pins come after the chain and the tool.
+        let first = 2 * arm.dof() + 1 + usize::from(tool.is_some());
+        for (k, rods) in rods.iter().enumerate() {
+            let end = |bar: usize, pin: usize| (Contact::BarFloor(rods.number + bar), first + 3 * k + pin);
+            ends.extend([end(0, 0), end(0, 1), end(1, 1), end(1, 2)]);
+        }
         let all = (0..parts.len()).flat_map(|k| (k + 1..parts.len()).map(move |l| (k, l))).collect();
         let mut shape = Shape {
             chain: Chain::new(arm),
@@ -123,6 +154,8 @@ impl Shape {
             tool,
             radius,
             parts,
+            rods,
+            ends,
             pairs: all,
             always: Vec::new(),
         };
@@ -148,6 +181,11 @@ impl Shape {
         &self.always
     }
 
+    /// The bars of closed loops, from 0, that are compared with the floor.
+    pub fn bars(&self) -> impl Iterator<Item = usize> + '_ {
+        self.rods.iter().flat_map(|rods| [rods.number - 1, rods.number])
+    }
+
     /// A floor at a height (m) along `up` from the base frame's origin.
     #[must_use]
     pub fn floor(&self, up: Vector3<f64>, height: f64, limits: &[JointLimits]) -> Floor {
@@ -168,13 +206,13 @@ impl Shape {
     pub fn blocked(&self, floor: &Floor, clearance: f64, limits: &[JointLimits]) -> f64 {
         let at_floor = |q: &Vec<f64>| {
             self.nearest(q, Some(floor))
-                .is_some_and(|near| near.distance < clearance && matches!(near.contact, Contact::Floor(_)))
+                .is_some_and(|near| near.distance < clearance && !matches!(near.contact, Contact::Links(..)))
         };
         poses(limits).filter(at_floor).count() as f64 / POSES as f64
     }
 
     /// The polyline in a pose: base origin, then for each joint its corner and its frame's origin, and the
-    /// tool, m.
+    /// tool; then of each parallelogram on one joint the three other pins. In m.
     #[must_use]
     pub fn vertices(&self, q: &[f64]) -> Vec<Vector3<f64>> {
         let poses = self.chain.poses(q);
@@ -190,6 +228,13 @@ impl Shape {
             before = (*rotation, *origin);
         }
         vertices.extend(self.tool.map(|tool| before.1 + before.0 * tool));
+        for Rods { joint, pins, .. } in &self.rods {
+            let [outer, inner] = pins.map(|(link, pin)| match link {
+                Some(link) => poses[link].1 + poses[link].0 * pin,
+                None => pin,
+            });
+            vertices.extend([outer, outer - vertices[*joint] + inner, inner]);
+        }
         vertices
     }
 
@@ -214,12 +259,10 @@ impl Shape {
             self.between(*pair, &vertices).map(|distance| Nearness { distance, contact })
         });
         let floor = floor.into_iter().flat_map(|floor| {
-            self.parts.iter().flat_map(|part| [(part, part.vertex), (part, part.vertex + 1)]).filter_map(
-                |(part, vertex)| {
-                    let distance = vertices[vertex].dot(&floor.up) - floor.height - self.radius;
-                    floor.moving[vertex].then_some(Nearness { distance, contact: Contact::Floor(part.link) })
-                },
-            )
+            self.ends.iter().filter_map(|(contact, vertex)| {
+                let distance = vertices[*vertex].dot(&floor.up) - floor.height - self.radius;
+                floor.moving[*vertex].then_some(Nearness { distance, contact: *contact })
+            })
         });
         links.chain(floor).min_by(|a, b| a.distance.total_cmp(&b.distance))
     }
@@ -231,6 +274,24 @@ impl Shape {
         let cut = 0.5 * (JOINED * self.radius - gap).max(0.0);
         Some(first.cut(0.0, cut)?.distance(&second.cut(cut, 0.0)?) - 2.0 * self.radius)
     }
+}
+
+/// The parallelograms of an arm that are on one joint.
+fn rods(arm: &Arm, modified: bool) -> Vec<Rods> {
+    let pin = |bar: &Bar| (bar.carrier, Vector3::from(bar.pin.each_ref().map(to_f64)));
+    let pair = |(k, pair): (usize, &[Bar])| match pair {
+        // Each turns with the link that carries the other's pin, the rod's behind the joint.
+        [rod, crank]
+            if rod.carrier == crank.parallel
+                && crank.carrier == rod.parallel
+                && rod.parallel < rod.carrier =>
+        {
+            let joint = 2 * rod.carrier? + 1 + usize::from(modified);
+            Some(Rods { number: k + 1, joint, pins: [pin(rod), pin(crank)] })
+        }
+        _ => None,
+    };
+    arm.bars.windows(2).enumerate().filter_map(pair).collect()
 }
 
 fn segment(part: &Part, vertices: &[Vector3<f64>]) -> Segment {
@@ -378,6 +439,66 @@ acceleration = 3
             // Both are cut three radii from the elbow; the shorter one ends 0.305 m from it.
             let ends = 2.0 * 0.15 * (0.5 * (std::f64::consts::PI - f64::abs(fold))).sin();
             approx::assert_abs_diff_eq!(near.distance, ends - 0.1, epsilon = 1e-9);
+        }
+    }
+
+    /// The pins of a loop are as far apart as its file says, in the plane of its joint, and the lowest point
+    /// is what is nearest to a floor.
+    #[test]
+    fn bars_are_above_the_floor() {
+        for (convention, rows) in [
+            (
+                "modified",
+                ["a = 0\nalpha = 0.4\nd = 0.5\ntheta = 0", "a = 0.5\nalpha = 0\nd = 0.1\ntheta = 0.3"],
+            ),
+            (
+                "standard",
+                ["a = 0.5\nalpha = 0\nd = 0.5\ntheta = 0", "a = 0.4\nalpha = 0.7\nd = 0.1\ntheta = 0.3"],
+            ),
+        ] {
+            let joint = |row: &str| {
+                format!(
+                    "[[joint]]\nkind = \"revolute\"\n{row}\nposition = [-1, 1]\nvelocity = 1\n\
+                     acceleration = 3\n"
+                )
+            };
+            let text = format!(
+                "name = \"bars\"\nconvention = \"{convention}\"\ngravity = [0, 0, -9.81]\n{}{}\
+                 [[loop]]\njoints = [2, \"a\", \"b\", \"c\"]\nlengths = [0.2, 0.5, 0.2, 0.5]\ninner = \"pi\"\n\
+                 outer = 2.5\n[tool]\nxyz = [0.1, 0, 0]\nrpy = [0, 0, 0]\n",
+                joint(rows[0]),
+                joint(rows[1])
+            );
+            let arm = Arm::parse(&text, "bars.toml").unwrap();
+            let limits = Limits::of(&arm, 0.0).unwrap().0;
+            let shape = Shape::new(&arm, &limits, 0.03);
+            assert_eq!(shape.bars().collect::<Vec<_>>(), [0, 1]);
+            for q in poses(&limits).take(20) {
+                let vertices = shape.vertices(&q);
+                let (joint, pins) = (shape.rods[0].joint, &vertices[6..]);
+                let ([outer, middle, inner], joint) = ([pins[0], pins[1], pins[2]], vertices[joint]);
+                for (a, b, length) in
+                    [(joint, outer, 0.2), (outer, middle, 0.5), (middle, inner, 0.2), (inner, joint, 0.5)]
+                {
+                    approx::assert_abs_diff_eq!((a - b).norm(), length, epsilon = 1e-12);
+                }
+                // All four are in one plane, at right angles to the joint's axis.
+                let turned = shape.vertices(&[q[0], q[1] + 0.3]);
+                let axis = (turned[6] - joint).cross(&(outer - joint)).normalize();
+                for pin in pins {
+                    approx::assert_abs_diff_eq!((pin - joint).dot(&axis), 0.0, epsilon = 1e-12);
+                }
+                // The inner pin does not turn with the joint.
+                approx::assert_abs_diff_eq!(turned[8], inner, epsilon = 1e-12);
+                let up = (joint - middle).normalize();
+                let floor = Floor { up, height: middle.dot(&up) + 1.0, moving: vec![true; vertices.len()] };
+                let low = vertices.iter().map(|v| v.dot(&up)).fold(f64::INFINITY, f64::min);
+                let near = shape.nearest(&q, Some(&floor)).unwrap();
+                approx::assert_abs_diff_eq!(near.distance, low - floor.height - 0.03, epsilon = 1e-12);
+                if low == middle.dot(&up) {
+                    assert!(matches!(near.contact, Contact::BarFloor(1 | 2)), "{near:?}");
+                }
+            }
         }
     }
 }
