@@ -485,7 +485,7 @@ fn slides(arm: &Arm) -> Vec<bool> {
     arm.moving_joints().map(|joint| joint.kind == JointKind::Prismatic).collect()
 }
 
-/// Lists of the map that are not of as many joints as the arm has.
+/// What of the map does not fit the arm's joints: lists of another length, units of the other kind.
 fn misfits(asked: Asked<'_>) -> Vec<(String, String)> {
     let n = asked.arm.dof();
     let mut misfits = Vec::new();

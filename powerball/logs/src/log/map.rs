@@ -316,8 +316,8 @@ impl Mapped {
         unit * of(&self.sign) * of(&self.scale)
     }
 
-    /// What is wrong with a unit of angles where a joint slides, or of lengths where one turns; a unit that is
-    /// given once needs one joint of its kind. Units that change no number pass.
+    /// What is wrong with a unit of angles where a joint slides, or of lengths where one turns. A unit that
+    /// is given once needs one joint of its kind. Units that change no number pass.
     pub(super) fn foreign_unit(&self, key: &str, slides: &[bool]) -> Option<String> {
         let is_foreign = |unit: &String, slides: bool| {
             factor(key, unit).is_some_and(|factor| factor != 1.0) && !belongs(key, unit, slides)
