@@ -351,6 +351,16 @@ fn units(
                 this: --map 'q.unit = \"deg\"')"
         );
         error(format!("q{}", j + 1), message);
+    } else if joint.kind == JointKind::Prismatic
+        && joint.position.is_some()
+        && span > ABSURD * reach
+        && high - low > reach
+    {
+        let message = format!(
+            "reaches {span:.1}, the joint {reach:.3} m: positions of joints that slide must be in metres \
+                (millimetres look like this: --map 'q.unit = \"mm\"')"
+        );
+        error(format!("q{}", j + 1), message);
     } else if joint
         .position
         .is_some_and(|[low, high]| raw.q[j].iter().any(|v| *v < low - 0.1 || *v > high + 0.1))

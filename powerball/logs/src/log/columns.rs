@@ -5,6 +5,7 @@ use super::map::{ByJoint, ColumnMap};
 use super::read::{Effort, Raw};
 use super::{Finding, LogError};
 use dyngen::Arm;
+use dyngen::arm::JointKind;
 use std::collections::HashMap;
 
 /// Whose log it is, and what is known of it beforehand.
@@ -201,7 +202,8 @@ pub(super) fn group(names: &[String], key: &str, asked: Asked<'_>) -> Result<Gro
         return Err(missing);
     }
     let scaled = if key == "goal" && mapped.is_plain() { &asked.map.q } else { mapped };
-    let factor = (0..n).map(|j| scaled.factor(key, j)).collect();
+    let factor =
+        slides(asked.arm).iter().enumerate().map(|(j, slides)| scaled.factor(key, j, *slides)).collect();
     Ok(Group { at: found.into_iter().flatten().collect(), factor })
 }
 
@@ -459,7 +461,7 @@ fn time(names: &[String], asked: Asked<'_>) -> Option<Group> {
         Some(name) => at(name),
         None => known.iter().find_map(|name| at(name)),
     };
-    found.map(|at| Group { at: vec![at], factor: vec![asked.map.t.factor("t", 0)] })
+    found.map(|at| Group { at: vec![at], factor: vec![asked.map.t.factor("t", 0, false)] })
 }
 
 /// N·m/A by joint.
@@ -478,7 +480,12 @@ pub(super) fn constants(arm: &Arm) -> Result<Vec<f64>, String> {
     ))
 }
 
-/// Lists of the map that are not of as many joints as the arm has.
+/// Which joints slide, of those that move on their own.
+fn slides(arm: &Arm) -> Vec<bool> {
+    arm.moving_joints().map(|joint| joint.kind == JointKind::Prismatic).collect()
+}
+
+/// What of the map does not fit the arm's joints: lists of another length, units of the other kind.
 fn misfits(asked: Asked<'_>) -> Vec<(String, String)> {
     let n = asked.arm.dof();
     let mut misfits = Vec::new();
@@ -492,6 +499,8 @@ fn misfits(asked: Asked<'_>) -> Vec<(String, String)> {
                 format!("{key}.{list}"),
                 format!("the map's list must have one entry for each of {n} joints"),
             ));
+        } else if let Some(message) = mapped.foreign_unit(key, &slides(asked.arm)) {
+            misfits.push((format!("{key}.unit"), message));
         }
     }
     misfits

@@ -190,7 +190,7 @@ fn time<'a>(table: &'a Table, map: &ColumnMap) -> Option<(Vec<f64>, String, Opti
     let stamped = table.stamps.iter().any(|s| s.is_finite());
     let own = table.columns.iter().find(column).filter(|_| table.received.is_empty() || !stamped);
     if let Some(own) = own.filter(|_| map.clock == Clock::Auto) {
-        let factor = map.t.factor("t", 0);
+        let factor = map.t.factor("t", 0, false);
         return Some((own.values.iter().map(|t| t * factor).collect(), own.name.clone(), None));
     }
     if table.received.is_empty() {

@@ -306,11 +306,30 @@ impl Mapped {
         self.unit.is_none() && self.sign.is_none() && self.scale.is_none()
     }
 
-    /// What the column of a joint is to be multiplied with.
-    pub(super) fn factor(&self, key: &str, joint: usize) -> f64 {
-        let unit = self.unit.as_ref().and_then(|unit| factor(key, unit.of(joint)?)).unwrap_or(1.0);
+    /// What the column of a joint is to be multiplied with. A unit that is given once is that of the joints
+    /// that it can belong to: of angles, or of lengths where the joint `slides`.
+    pub(super) fn factor(&self, key: &str, joint: usize, slides: bool) -> f64 {
+        let unit =
+            self.unit.as_ref().and_then(|unit| unit.of(joint)).filter(|unit| belongs(key, unit, slides));
+        let unit = unit.and_then(|unit| factor(key, unit)).unwrap_or(1.0);
         let of = |by: &Option<ByJoint<f64>>| by.as_ref().and_then(|by| by.of(joint)).copied().unwrap_or(1.0);
         unit * of(&self.sign) * of(&self.scale)
+    }
+
+    /// What is wrong with a unit of angles where a joint slides, or of lengths where one turns. A unit that
+    /// is given once needs one joint of its kind. Units that change no number pass.
+    pub(super) fn foreign_unit(&self, key: &str, slides: &[bool]) -> Option<String> {
+        let is_foreign = |unit: &String, slides: bool| {
+            factor(key, unit).is_some_and(|factor| factor != 1.0) && !belongs(key, unit, slides)
+        };
+        let units: Vec<&String> = (0..slides.len()).map_while(|j| self.unit.as_ref()?.of(j)).collect();
+        let mut foreign =
+            units.iter().zip(slides).enumerate().filter(|(_, (unit, slides))| is_foreign(unit, **slides));
+        let (j, (unit, slides)) = foreign.next()?;
+        let alone = matches!(self.unit, Some(ByJoint::All(_)));
+        let does = if *slides { "slides" } else { "turns" };
+        (!alone || foreign.count() + 1 == units.len())
+            .then(|| format!("joint {} {does}: `{unit}` cannot be its unit", j + 1))
     }
 
     /// The name of a list that is not of as many joints as the arm has.
@@ -329,6 +348,12 @@ impl Mapped {
     }
 }
 
+/// Whether a unit can be that of a joint: of positions and velocities it is one of lengths or of angles.
+fn belongs(key: &str, unit: &str, slides: bool) -> bool {
+    let lengths = ["m", "mm", "m/s", "mm/s"];
+    !["q", "goal", "dq"].contains(&key) || lengths.contains(&unit) == slides
+}
+
 fn factor(key: &str, unit: &str) -> Option<f64> {
     units(key).iter().find(|(names, _)| names.contains(&unit)).map(|(_, factor)| *factor)
 }
@@ -340,8 +365,8 @@ mod tests {
     #[test]
     fn units_signs_and_scales_multiply_and_mistakes_are_named() {
         let map = ColumnMap::parse("q.unit = \"deg\"\ntau = { sign = [1, -1], scale = 2 }", "x").unwrap();
-        assert_eq!(map.q.factor("q", 1) * 180.0, std::f64::consts::PI);
-        assert_eq!((map.tau.factor("tau", 0), map.tau.factor("tau", 1)), (2.0, -2.0));
+        assert_eq!(map.q.factor("q", 1, false) * 180.0, std::f64::consts::PI);
+        assert_eq!((map.tau.factor("tau", 0, false), map.tau.factor("tau", 1, true)), (2.0, -2.0));
         assert_eq!((map.tau.misfit(2), map.tau.misfit(3)), (None, Some("sign")));
         let wrong = |text: &str| ColumnMap::parse(text, "m.toml").unwrap_err();
         assert!(wrong("q.unit = \"inch\"").contains("m.toml: q.unit: `inch` is unknown; known are rad"));

@@ -245,6 +245,60 @@ fn decimal_commas_are_read_where_other_signs_stand_between_numbers() {
     }
 }
 
+#[test]
+fn aligned_columns_are_read() {
+    let (plain, _) = read(&text(HEADER, |_, f| Some(f.join(","))));
+    let aligned = |fields: Vec<String>| fields.iter().map(|f| format!("{f:>12}")).collect::<String>();
+    let header = aligned(HEADER.split(',').map(str::to_string).collect());
+    for (begin, end) in [("", ""), ("", "  "), ("  ", "\r")] {
+        let line = |_, f: Vec<String>| Some(format!("{begin}{}{end}", aligned(f)));
+        let (log, findings) = read(&text(&format!("{header}{end}"), line));
+        let (log, plain) = (log.unwrap(), plain.as_ref().unwrap());
+        assert_eq!((&log.t, &log.q, &log.torque), (&plain.t, &plain.q, &plain.torque), "{end:?}");
+        assert!(findings.is_empty(), "{findings:?}");
+    }
+}
+
+/// An arm whose second joint slides by up to 2 m.
+fn sliding() -> Arm {
+    let (first, second) = ARM.rsplit_once("[[joint]]").unwrap();
+    let second = second.replace("revolute", "prismatic") + "position = [-2, 2]\n";
+    Arm::parse(&format!("{first}[[joint]]{second}"), "two.toml").unwrap()
+}
+
+#[test]
+fn a_unit_is_that_of_joints_that_can_have_it() {
+    let read = |scale: [f64; 2], map: &str| {
+        let line = |_, mut f: Vec<String>| {
+            for (k, scale) in scale.iter().enumerate() {
+                f[k + 1] = format!("{:e}", f[k + 1].parse::<f64>().unwrap() * scale);
+            }
+            Some(f.join(","))
+        };
+        let map = ColumnMap::parse(map, "map").unwrap();
+        let asked = Asked { arm: &sliding(), map: &map, file: "x.csv", header: None, goals: false };
+        super::read::parse(text(HEADER, line).as_bytes(), asked, &mut Vec::new())
+    };
+    let plain = read([1.0, 1.0], "").unwrap();
+    let degree = std::f64::consts::PI / 180.0;
+    for (scale, map) in [
+        ([1.0 / degree, 1.0], "q.unit = \"deg\""),
+        ([1.0, 1e3], "q.unit = \"mm\""),
+        ([1.0 / degree, 1e3], "q.unit = [\"deg\", \"mm\"]"),
+        ([1.0, 1.0], "q.unit = \"rad\""),
+    ] {
+        let log = read(scale, map).unwrap();
+        for (own, other) in plain.q.iter().flatten().zip(log.q.iter().flatten()) {
+            assert!((own - other).abs() < 1e-12, "{map}: {own} {other}");
+        }
+    }
+    let said = |scale, map| read(scale, map).unwrap_err().to_string();
+    let wrong = said([1.0, 1.0], "q.unit = [\"deg\", \"deg\"]");
+    assert!(wrong.contains("q.unit: joint 2 slides: `deg` cannot be its unit"), "{wrong}");
+    let wrong = said([1.0, 1e3], "");
+    assert!(wrong.contains("q2: reaches 1000.0, the joint 2.000 m") && wrong.contains("\"mm\""), "{wrong}");
+}
+
 /// What people give by mistake is named by what it is.
 #[test]
 fn files_of_other_kinds_are_named() {

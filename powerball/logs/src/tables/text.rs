@@ -5,7 +5,7 @@ use super::memory::{Memory, few_columns};
 use super::table::RowSink;
 use super::{Finding, LogError};
 use std::cell::Cell;
-use std::io::Read;
+use std::io::{self, BufReader, Read};
 
 /// The first bytes of this number show whether a file is text.
 pub(super) const HEAD: usize = 4096;
@@ -78,11 +78,13 @@ pub(crate) fn read(
         quantity: quantity.to_string(),
         message,
     };
-    let mut reader = csv::ReaderBuilder::new()
-        .delimiter(delimiter)
-        .flexible(true)
-        .trim(csv::Trim::All)
-        .from_reader(bytes.chain(input));
+    let mut reader =
+        csv::ReaderBuilder::new().delimiter(delimiter).flexible(true).trim(csv::Trim::All).from_reader(
+            match delimiter {
+                b' ' => Box::new(SingleBlanks::new(bytes.chain(input))) as Box<dyn Read>,
+                _ => Box::new(bytes.chain(input)),
+            },
+        );
     let header = reader
         .byte_headers()
         .map_err(|e| LogError(vec![error(Some(1), "header", format!("cannot be read: {e}"))]))?
@@ -134,6 +136,54 @@ pub(crate) fn read(
         findings.push(error(None, "numbers", "have decimal commas, and are read as such".to_string()));
     }
     Ok(last_torn)
+}
+
+/// A table of aligned columns as one with a single blank between fields, and none at either end of a line.
+struct SingleBlanks<R> {
+    bytes: io::Bytes<BufReader<R>>,
+    /// Whether the last byte ended a line.
+    begins: bool,
+    /// The byte after a blank that was handed over.
+    next: Option<u8>,
+}
+
+impl<R: Read> SingleBlanks<R> {
+    fn new(input: R) -> SingleBlanks<R> {
+        SingleBlanks { bytes: BufReader::new(input).bytes(), begins: true, next: None }
+    }
+
+    fn byte(&mut self) -> io::Result<Option<u8>> {
+        if let Some(byte) = self.next.take() {
+            return Ok(Some(byte));
+        }
+        let mut blank = false;
+        loop {
+            let Some(byte) = self.bytes.next().transpose()? else { return Ok(None) };
+            if byte == b' ' {
+                blank = true;
+                continue;
+            }
+            let between = blank && !self.begins && !matches!(byte, b'\r' | b'\n');
+            self.begins = byte == b'\n';
+            if between {
+                self.next = Some(byte);
+                return Ok(Some(b' '));
+            }
+            return Ok(Some(byte));
+        }
+    }
+}
+
+impl<R: Read> Read for SingleBlanks<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        for (count, place) in buffer.iter_mut().enumerate() {
+            match self.byte()? {
+                Some(byte) => *place = byte,
+                None => return Ok(count),
+            }
+        }
+        Ok(buffer.len())
+    }
 }
 
 /// The delimiter of the names in the first line: names may hold blanks if there are commas or other
