@@ -73,7 +73,7 @@ fn judge_of(few: &[usize], count: usize) -> usize {
 fn words(effects: &[NamedEffect]) -> String {
     let one = |e: &NamedEffect| {
         let joints: Vec<String> = e.joints.iter().map(ToString::to_string).collect();
-        format!("{} ({})", e.effect, joints.join(" "))
+        format!("{} ({}; stated {:.0} %)", e.effect, joints.join(" "), 100.0 * e.probability)
     };
     effects.iter().map(one).collect::<Vec<_>>().join(", ")
 }
