@@ -1,10 +1,12 @@
-//! Loops that a MuJoCo model closes by `<connect>`: parallelograms on the chain become `[[loop]]`, with the
-//! bodies of their bars.
+//! Loops that a MuJoCo model closes by `<connect>`: loops of four bars on one joint of the chain and
+//! parallelograms on two become `[[loop]]`, with the bodies of their bars.
 
 use super::chain::{ChainJoint, Mass, held, masses};
 use super::pose::Pose;
 use super::tree::Tree;
 use super::urdf::{Connect, Mimic};
+use crate::arm::Linkage;
+use crate::exact::rational;
 use nalgebra::Vector3;
 
 /// Points and directions nearer than this are the same, m or as a sine.
@@ -12,7 +14,7 @@ const SAME: f64 = 1e-6;
 /// The joints of a loop.
 const CORNERS: usize = 4;
 
-/// A parallelogram on the chain, at q = 0 in the root link's frame.
+/// A loop of four bars on the chain, at q = 0 in the root link's frame.
 pub(crate) struct ChainLoop {
     /// The loop's first and last joint of the chain.
     pub(crate) first: usize,
@@ -24,6 +26,9 @@ pub(crate) struct ChainLoop {
     /// From the last joint of the chain to the first pin, and from the first joint to the last pin.
     pub(crate) outer: Vector3<f64>,
     pub(crate) inner: Vector3<f64>,
+    /// Of a loop that is no parallelogram, whether its middle pin is on the left of the way from the first to
+    /// the last about the joint's axis.
+    pub(crate) left: Option<bool>,
     /// The loop's bars that are no links of the chain, in the order of the pins between them.
     pub(crate) bars: Vec<ChainBar>,
 }
@@ -31,6 +36,8 @@ pub(crate) struct ChainLoop {
 /// A bar of a loop.
 pub(crate) struct ChainBar {
     pub(crate) name: String,
+    /// Of a loop that is no parallelogram the bar's axes x and z: along it, and along the joint's axis.
+    pub(crate) axes: Option<[Vector3<f64>; 2]>,
     pub(crate) masses: Vec<Mass>,
 }
 
@@ -94,8 +101,24 @@ pub(super) fn close(
     let own = if first == last { vec![first_joint.point] } else { vec![first_joint.point, last_joint.point] };
     let corners: Vec<Vector3<f64>> = own.into_iter().chain(pins.iter().map(|pin| pin.point)).collect();
     let directions = pins.iter().filter_map(|pin| pin.direction).chain([last_joint.direction]);
-    let sides = parallelogram(&corners, first_joint.direction, directions)?;
-    let bar = |node: &Option<usize>| ChainBar { name: seen.name(*node), masses: seen.masses(*node) };
+    let sides = sides(&corners, first_joint.direction, directions)?;
+    let left = match (sides[0] + sides[2]).norm() > SAME {
+        false => None,
+        true if first != last => {
+            return Err(
+                "with two joints of the chain only loops whose opposite bars are equal and parallel \
+                        are supported"
+                    .to_string(),
+            );
+        }
+        true => Some(middle_pin(&sides, first_joint)?),
+    };
+    let bar = |(k, node): (usize, &Option<usize>)| ChainBar {
+        name: seen.name(*node),
+        masses: seen.masses(*node),
+        // To the middle pin, from either side.
+        axes: left.map(|_| [[sides[1], -sides[2]][k].normalize(), first_joint.direction]),
+    };
     let mut notes = Vec::new();
     for joint in of_bars.iter().map(|j| &tree.robot.joints[*j]) {
         if joint.motor.is_some_and(|motor| motor.armature != 0.0) {
@@ -105,10 +128,11 @@ pub(super) fn close(
     let found = ChainLoop {
         first,
         last,
-        lengths: std::array::from_fn(|k| sides[k % 2].norm()),
+        lengths: std::array::from_fn(|k| sides[if left.is_some() { k } else { k % 2 }].norm()),
+        left,
         outer: sides[last - first],
         inner: -sides[CORNERS - 1],
-        bars: bars.iter().map(bar).collect(),
+        bars: bars.iter().enumerate().map(bar).collect(),
         pins: pins.into_iter().map(|pin| pin.name).collect(),
     };
     if first != last {
@@ -137,8 +161,8 @@ fn in_order(
     (open.is_empty() && at == inner).then_some((pins, bars))
 }
 
-/// The sides of a parallelogram from corner to corner, in its plane, m; or why it is none.
-fn parallelogram(
+/// The sides of a loop from corner to corner, in its plane, m; or why it has none.
+fn sides(
     corners: &[Vector3<f64>],
     normal: Vector3<f64>,
     mut directions: impl Iterator<Item = Vector3<f64>>,
@@ -149,13 +173,40 @@ fn parallelogram(
     let flat = |v: Vector3<f64>| v - normal * normal.dot(&v);
     let sides: [Vector3<f64>; CORNERS] =
         std::array::from_fn(|k| flat(corners[(k + 1) % CORNERS] - corners[k]));
-    if (sides[0] + sides[2]).norm() > SAME {
-        return Err("only loops whose opposite bars are equal and parallel are supported".to_string());
-    }
-    if sides[..2].iter().any(|side| side.norm() < SAME) {
+    if sides.iter().any(|side| side.norm() < SAME) {
         return Err("two of its hinges are at one place".to_string());
     }
     Ok(sides)
+}
+
+/// Whether the middle pin of a loop that is no parallelogram is on the left, or why an arm file has no such
+/// loop.
+fn middle_pin(sides: &[Vector3<f64>; CORNERS], joint: &ChainJoint) -> Result<bool, String> {
+    let [first, rod, rocker, last] = sides.each_ref().map(|side| side.norm());
+    let same = |a: f64, b: f64| (a - b).abs() < SAME;
+    if same(first, rocker) && same(rod, last) || same(first, rod) && same(rocker, last) {
+        return Err("its bars are two pairs of equal ones, and it is no parallelogram".to_string());
+    }
+    let (x, y) = (sides[0] / first, joint.direction.cross(&sides[0]) / first);
+    let exact = |v: f64| rational::from_f64(v).unwrap_or_default();
+    let in_plane = |v: Vector3<f64>| [v.dot(&x), v.dot(&y)].map(exact);
+    let left = (sides[1] + sides[2]).cross(&sides[1]).dot(&joint.direction) > 0.0;
+    let linkage = Linkage {
+        joint: 0,
+        outer: in_plane(sides[0]),
+        inner: in_plane(-sides[CORNERS - 1]),
+        rod: exact(rod),
+        rocker: exact(rocker),
+        left,
+    };
+    match linkage.open_within(joint.position, 0.0) {
+        None => Ok(left),
+        Some(closes) => Err(format!(
+            "it closes only where q of joint '{}' is {closes}: give it a range within, away from these dead \
+             points",
+            joint.name
+        )),
+    }
 }
 
 /// The tree at q = 0.

@@ -138,11 +138,14 @@ fn loop_table(text: &mut String, closed: &ChainLoop, chain: &Chain, frames: &Fra
         closed.bars.iter().map(|bar| format!("{{ name = \"{}\" }}", quoted(&bar.name))).collect();
     let _ = write!(
         text,
-        "\n[[loop]]\njoints = [{}]\nlengths = [{}]\nouter = {}\ninner = {}\nbar = [{}]\n",
+        "\n[[loop]]\njoints = [{}]\nlengths = [{}]\nouter = {}\ninner = {}\n{}bar = [{}]\n",
         joints.join(", "),
         lengths.join(", "),
         angle(outer, tolerance),
         angle(inner.sin().atan2(inner.cos()), tolerance),
+        closed.left.map_or(String::new(), |left| {
+            format!("middle = \"{}\"\n", if left { "left" } else { "right" })
+        }),
         bars.join(", ")
     );
 }
@@ -216,7 +219,11 @@ pub(super) fn values(chain: &Chain, frames: &Frames, arm: &Arm) -> Vec<(Paramete
     let of_bars = bars.flat_map(|((bar, of), link)| {
         let frame = |link: Option<usize>| link.map_or(&frames.base, |link| &frames.links[link]);
         let pin = Vector3::from(of.pin.each_ref().map(rational::to_f64));
-        let frame = Pose { rotation: frame(of.parallel).rotation, origin: frame(of.carrier).point(pin) };
+        let origin = frame(of.carrier).point(pin);
+        let frame = match bar.axes {
+            None => Pose { rotation: frame(of.parallel).rotation, origin },
+            Some([x, z]) => Pose::from_axes(z, x, origin),
+        };
         let values = link_values(&bar.masses, &frame);
         ParameterKind::ALL.into_iter().zip(values).map(move |(kind, value)| (Parameter { link, kind }, value))
     });
