@@ -122,6 +122,7 @@ fn slip(graph: &Graph, outputs: &[Expr], _: &ConstantField) -> (Graph, Vec<Expr>
             Node::Add(x, y) => b.add(&signed(&new, x), &signed(&new, y)),
             Node::Mul(x, y) => b.mul(&signed(&new, x), &signed(&new, y)),
             Node::Div(x, y) => b.div(signed(&new, x), signed(&new, y)),
+            Node::Sqrt(x) => b.sqrt(signed(&new, x)),
         };
     }
     let outputs = outputs.iter().map(|e| signed(&new, *e)).collect();

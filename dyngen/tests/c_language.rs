@@ -105,6 +105,7 @@ fn cases() -> Vec<Case> {
             friction: terms(&["coulomb", "viscous"]),
             ..case("crane", "crane_5", file("crane.toml", CRANE))
         },
+        case("linkage", "rocker", workspace().join("dyngen/tests/loops/rocker.toml")),
         case("gantry", "gantry", file("gantry.toml", GANTRY)),
         Case { values: Some(values), ..case("planar", "planar_2r", arms.join("planar2r.toml")) },
     ]

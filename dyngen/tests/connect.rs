@@ -11,6 +11,7 @@ use rand::{RngExt, SeedableRng};
 
 const CRANK: &str = include_str!("mjcf/crank.xml");
 const LEVEL: &str = include_str!("mjcf/level.xml");
+const LINKAGE: &str = include_str!("mjcf/linkage.xml");
 
 /// From MuJoCo 4.0.0: q, q̇ and q̈ of the joints that move on their own, and their torques. The others'
 /// motion is solved from the equality's Jacobian and its rate; the torques are Gᵀ times those of mj_inverse
@@ -51,6 +52,35 @@ const OF_LEVEL: [Known<3>; 2] = [
     ],
 ];
 
+/// Pinocchio 4.1.0's constraint dynamics, with its 3-D contact in place of the equality, gives these
+/// accelerations back from these torques to 2e-10.
+const OF_LINKAGE: [Known<5>; 2] = [
+    [
+        [0.4, 0.01, 0.43, -0.38, 0.1],
+        [-0.37, 0.91, -0.98, 1.11, 0.13],
+        [2.41, -0.14, -0.42, 1.73, 2.9],
+        [
+            43.346664553717986,
+            -113.22603009673115,
+            -90.27744816160646,
+            -6.102573374790618,
+            -0.11773861606673997,
+        ],
+    ],
+    [
+        [-0.12, 0.42, 0.39, -0.29, 0.1],
+        [0.61, 1.33, 0.5, -1.1, -0.01],
+        [-0.04, 0.0, 2.75, -0.9, -1.66],
+        [
+            15.081766181166136,
+            -174.50607767447576,
+            -18.60681894767255,
+            4.744647167019242,
+            -0.12482533803339806,
+        ],
+    ],
+];
+
 fn imported(text: &str, tip: &str) -> Imported {
     let options = Options { tip: Some(tip.to_string()), ..Options::default() };
     import::any(text, "arm.xml", &options).unwrap_or_else(|e| panic!("{e}"))
@@ -79,6 +109,25 @@ fn a_crank_and_its_rod_are_bars() {
     assert!(!found.notes.iter().any(|note| note.contains("left out")), "{:?}", found.notes);
 }
 
+/// Lengths of any kind: rod and crank turn as the elbow does not.
+#[test]
+fn a_crank_and_its_rod_may_be_of_any_length() {
+    let found = compare(LINKAGE, &OF_LINKAGE);
+    let bars: Vec<_> = found.arm.bars.iter().map(|bar| (bar.name.as_str(), bar.hinge.is_some())).collect();
+    assert_eq!((bars, found.arm.dof()), (vec![("rod", true), ("crank", true)], 5), "{}", found.text);
+    assert!(!found.notes.iter().any(|note| note.contains("left out")), "{:?}", found.notes);
+    // Without limits the elbow would turn beyond a dead point.
+    for (from, to, words) in [
+        (" range=\"-0.5 0.5\"", "", "it closes only where q of joint 'elbow' is between"),
+        ("range=\"-0.5 0.5\"", "range=\"-0.5 0.7\"", "rad: give it a range within"),
+    ] {
+        assert!(LINKAGE.contains(from), "{from}");
+        let found = imported(&LINKAGE.replacen(from, to, 1), "hand");
+        let said = |note: &String| note.contains("<connect> is left out") && note.contains(words);
+        assert!(found.arm.bars.is_empty() && found.notes.iter().any(said), "{words}: {:?}", found.notes);
+    }
+}
+
 #[test]
 fn a_stay_that_keeps_a_plate_level_is_a_bar() {
     let found = compare(LEVEL, &OF_LEVEL);
@@ -105,7 +154,7 @@ fn rounded_angles_of_a_bar_are_taken_as_meant() {
 #[test]
 fn loops_that_an_arm_file_has_not_are_left_out_with_a_reason() {
     for (from, to, words) in [
-        ("anchor=\"0 0 1.1\"", "anchor=\"0 0 1.0\"", "opposite bars are equal and parallel"),
+        ("anchor=\"0 0 1.1\"", "anchor=\"0 0 1.0\"", "it closes only where q of joint 'elbow' is between"),
         (
             "<joint name=\"rod end\" axis=\"0 1 0\"/>",
             "<joint name=\"rod end\" axis=\"0 1 0.2\"/>",

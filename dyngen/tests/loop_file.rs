@@ -3,11 +3,13 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use dyngen::consistency::check;
-use dyngen::{Arm, Model, SetKind};
+use dyngen::{Arm, Function, Model, SetKind};
 
 const CRANK: &str = include_str!("loops/crank.toml");
 const LEVEL: &str = include_str!("loops/level.toml");
 const REMOTE: &str = include_str!("loops/remote.toml");
+const CROSSED: &str = include_str!("loops/crossed.toml");
+const ROCKER: &str = include_str!("loops/rocker.toml");
 
 /// The joint that the loop ties may also be the one with the motor.
 #[test]
@@ -91,6 +93,57 @@ fn a_bar_is_called_by_its_name() {
     assert_eq!(last, [Some(0), Some(1), Some(2), Some(3), Some(2), Some(2)]);
 }
 
+/// Products of what moves with three linkages are too many to be tried one by one.
+#[test]
+fn an_arm_may_have_many_linkages() {
+    let (chain, own) = CROSSED.split_at(CROSSED.find("[[loop]]").unwrap());
+    let first = own[..own[1..].find("[[loop]]").unwrap() + 1].replace("\"second\"", "\"first\"");
+    let first = first.replace("\"a\", \"b\", \"c\"", "\"g\", \"h\", \"i\"");
+    let arm = Arm::parse(&format!("{chain}{first}\n{own}"), "arm.toml").unwrap();
+    assert_eq!((arm.linkages().count(), arm.bodies()), (3, 9));
+    let model = Model::derive(arm).unwrap();
+    model.function(Function::InverseDynamics, SetKind::Minimal).unwrap();
+}
+
+/// Of loops that are no parallelograms a joint has one.
+#[test]
+fn a_joint_turns_one_linkage() {
+    let (chain, own) = ROCKER.split_at(ROCKER.find("[[loop]]").unwrap());
+    let other = own.replace("\"crank pin\", \"middle\", \"foot\"", "\"a\", \"b\", \"c\"");
+    let error = Arm::parse(&format!("{chain}{own}\n{other}"), "arm.toml").unwrap_err().to_string();
+    assert!(error.contains("loop 2: its joint has another loop that is no parallelogram"), "{error}");
+}
+
+/// A joint with a rod and a rocker may follow another one, and another one may follow it.
+#[test]
+fn the_joint_of_a_linkage_may_follow_or_be_followed() {
+    for joint in [2, 3] {
+        let text = format!(
+            r#"
+name = "tied"
+convention = "modified"
+gravity = [0, 0, -9.81]
+joint = [
+    {{ kind = "revolute", a = 0, alpha = 0, d = 0.5, theta = 0 }},
+    {{ kind = "revolute", a = 0.3, alpha = "pi/2", d = 0.1, theta = "-pi/2" }},
+    {{ kind = "revolute", a = 0.2, alpha = 0, d = 0, theta = 0, mimic = {{ joint = 2, ratio = -2 }} }},
+]
+[[loop]]
+joints = [{joint}, "crank pin", "middle", "foot"]
+lengths = [0.2, 0.9, 0.6, 0.8]
+inner = 0
+outer = "pi/2"
+middle = "left"
+"#
+        );
+        let model = Model::derive(Arm::parse(&text, "arm.toml").unwrap()).unwrap();
+        for function in [Function::InverseDynamics, Function::CoriolisMatrix, Function::TotalMomentumMatrix] {
+            model.function(function, SetKind::Full).unwrap_or_else(|e| panic!("{joint}: {e}"));
+        }
+        assert_eq!(model.arm().last_joint(4), Some(joint - 1));
+    }
+}
+
 #[test]
 fn loops_that_are_none_are_reported() {
     let cases = [
@@ -105,7 +158,22 @@ fn loops_that_are_none_are_reported() {
         (CRANK, ", \"crank\"]", "]", "the four joints around the loop"),
         (CRANK, "\"elbow\", \"tail\"", "\"tail\", \"elbow\"", "must begin with those of the chain"),
         (CRANK, "1.1, 0.25, 1.1]", "1.1, 0.25, 3.1]", "do not close: 3.1 m"),
-        (CRANK, "1.1, 0.25, 1.1]", "1.1, 0.3, 1.1]", "only loops whose opposite bars are equal"),
+        (CRANK, "1.1, 0.25, 1.1]", "1.1, 0.3, 1.1]", "say with middle = \"left\" or \"right\""),
+        (CRANK, "0.25, 1.1, 0.25, 1.1]", "1.1, 1.1, 0.25, 0.25]", "of such loops only parallelograms"),
+        (CRANK, "outer = \"pi\"", "outer = \"pi\"\nmiddle = \"left\"", "of such loops only parallelograms"),
+        (CRANK, "outer = \"pi\"", "outer = \"pi\"\nmiddle = \"up\"", "must be \"left\" or \"right\", found"),
+        (
+            CRANK,
+            "1.1, 0.25, 1.1]\n",
+            "0.9, 0.4, 1.1]\nmiddle = \"left\"\n",
+            "it closes only where q of joint 3 is between -2.432712 and 2.432712 rad",
+        ),
+        (
+            LEVEL,
+            "1.1, 0.3, 1.1, 0.3]",
+            "1.1, 0.3, 1.0, 0.3]",
+            "with two joints of the chain only loops whose",
+        ),
         (CRANK, "1.1, 0.25, 1.1]", "1.1, 0.25]", "must be four lengths in m"),
         (CRANK, "1.1, 0.25, 1.1]", "1.1, 0.25, -1.1]", "must be greater than zero"),
         (CRANK, "inner = \"pi\"", "", "the key 'inner' is missing"),

@@ -20,8 +20,11 @@ mod support;
 const CRANK: &str = include_str!("loops/crank.toml");
 const LEVEL: &str = include_str!("loops/level.toml");
 const REMOTE: &str = include_str!("loops/remote.toml");
+const ROCKER: &str = include_str!("loops/rocker.toml");
+const DOUBLE: &str = include_str!("loops/double.toml");
+const CROSSED: &str = include_str!("loops/crossed.toml");
 
-const ARMS: [&str; 3] = [CRANK, LEVEL, REMOTE];
+const ARMS: [&str; 6] = [CRANK, LEVEL, REMOTE, ROCKER, DOUBLE, CROSSED];
 
 /// A number along a path, to second order: value, rate, rate of the rate.
 #[derive(Clone, Copy, Debug, Default)]
@@ -138,14 +141,29 @@ struct Linkage {
     lengths: [f64; 4],
     inner: f64,
     outer: f64,
+    /// Of a loop that is no parallelogram, whether its middle pin is on the left.
+    left: Option<bool>,
 }
 
 fn linkages(text: &str) -> Vec<Linkage> {
-    let of = |first, last, lengths, inner, outer| Linkage { first, last, lengths, inner, outer };
+    let of = |first, last, lengths, inner, outer| Linkage { first, last, lengths, inner, outer, left: None };
+    let on = |joint, lengths, inner, outer, left| Linkage {
+        left: Some(left),
+        ..of(joint, joint, lengths, inner, outer)
+    };
     use std::f64::consts::{FRAC_PI_2, PI};
     match text {
         CRANK => vec![of(2, 2, [0.25, 1.1, 0.25, 1.1], PI, PI)],
         LEVEL => vec![of(1, 2, [1.1, 0.3, 1.1, 0.3], 0.0, 0.0), of(3, 4, [1.2, 0.25, 1.2, 0.25], 1.9, -0.4)],
+        ROCKER => vec![on(1, [0.2, 0.9, 0.6, 0.8], 0.3, FRAC_PI_2, true)],
+        DOUBLE => vec![
+            on(0, [0.6, 0.5, 0.7, 0.7], 0.3, 0.1, false),
+            on(2, [0.3, 0.25, 0.35, 0.35], -FRAC_PI_2, 1.4, true),
+        ],
+        CROSSED => vec![
+            on(1, [0.3, 1.0, 0.35, 1.0], 0.0, FRAC_PI_2, false),
+            on(2, [0.3, 1.0, 0.32, 1.01], 0.2, 0.5, true),
+        ],
         _ => vec![
             of(1, 1, [0.15, 0.516, 0.15, 0.516], 0.2, FRAC_PI_2),
             of(0, 0, [0.2, 0.3, 0.2, 0.3], -FRAC_PI_2, 1.0),
@@ -262,7 +280,10 @@ fn bars_of(linkage: &Linkage, inner: Frame, outer: Frame) -> Vec<Frame> {
         let v = minus(*p, outer.origin);
         dot(v, v).0
     };
-    let far = pins.into_iter().max_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap();
+    let far = match linkage.left {
+        Some(left) => pins[usize::from(!left)],
+        None => pins.into_iter().max_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap(),
+    };
     vec![along(pin, far, second, normal), along(foot, far, third, normal)]
 }
 
@@ -312,8 +333,10 @@ fn turns(arm: &Arm, loops: &[Linkage], q: &[f64]) -> Vec<[[f64; 3]; 3]> {
     let frames = frames(arm, loops, &path);
     let world = Frame::world();
     let of = |(k, bar): (usize, &dyngen::arm::Bar)| {
-        let parallel = bar.parallel.map_or(&world, |link| &frames[link]);
         let own = &frames[arm.links() + k];
+        let link = bar.parallel.map_or(&world, |link| &frames[link]);
+        // The frame of a bar that turns on its own is that of the reference.
+        let parallel = if bar.hinge.is_some() { own } else { link };
         std::array::from_fn(|i| std::array::from_fn(|j| dot(own.axes[i], parallel.axes[j]).0))
     };
     arm.bars.iter().enumerate().map(of).collect()

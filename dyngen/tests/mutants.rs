@@ -72,7 +72,7 @@ fn counts(arm: &str, language: Language, wished: usize, seed: u64, passed: &mut 
 
 fn every_mutant_is_found(each: usize, seed: u64) {
     let mut passed = Vec::new();
-    for arm in ["tests/arms/scara.toml", "tests/arms/twist.toml"] {
+    for arm in ["tests/arms/scara.toml", "tests/arms/twist.toml", "dyngen/tests/loops/rocker.toml"] {
         for language in [Language::Rust, Language::C, Language::Cuda, Language::Wgsl] {
             let counts = counts(arm, language, each, seed, &mut passed);
             println!("{arm}, {language}: {counts:?}");

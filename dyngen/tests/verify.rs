@@ -426,12 +426,16 @@ joint = [
 "#;
     let transmission = mimic.replace(", mimic = { joint = 2, ratio = \"-3/2\", offset = 0.2 }", "")
         + "\n[[transmission]]\njoints = [1, 2]\nmatrix = [[1, 0], [\"1/2\", 1]]\n";
-    for (name, arm) in
-        [("mimic", mimic), ("transmission", &transmission), ("loop", include_str!("loops/crank.toml"))]
-    {
+    for (name, arm) in [
+        ("mimic", mimic),
+        ("transmission", &transmission),
+        ("loop", include_str!("loops/crank.toml")),
+        ("linkage", include_str!("loops/rocker.toml")),
+        ("linkages", include_str!("loops/double.toml")),
+    ] {
         let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}_verified.toml"));
         std::fs::write(&path, arm).unwrap();
-        for language in [Language::Rust, Language::C] {
+        for language in [Language::Rust, Language::C, Language::Cuda] {
             let config = Config::new(&path).language(language).functions(FUNCTIONS);
             let config = config.friction(["viscous".parse().unwrap()]).batch(language == Language::Rust);
             let text = config.source().unwrap();

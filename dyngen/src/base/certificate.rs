@@ -6,14 +6,15 @@
 //! vanishes at a random point with probability below 2⁻⁵⁴; as many points are taken as there are columns.
 
 use super::steps::Sizes;
-use crate::arm::{Arm, Drive};
+use crate::arm::{Arm, Drive, Linkage};
 use crate::exact::constant::ConstantField;
 use crate::exact::elimination::{Dependence, Unproven, rank};
 use crate::exact::prime::{Draws, Fp, PrimeField};
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::lagrangian::elements::{ArmElements, Source};
-use crate::lagrangian::followers::{input_angles, with_theta};
+use crate::lagrangian::followers::{closing_angles, still_angles, with_theta};
+use crate::lagrangian::linkage::{BarTurns, turns};
 use crate::lagrangian::twice_lagrangian;
 
 /// Points beyond one for each kept column.
@@ -77,7 +78,7 @@ struct Point<'a> {
 
 impl<'a> Point<'a> {
     fn draw(arm: &'a Arm, field: &'a ConstantField, sizes: Sizes, draws: &mut Draws) -> Self {
-        let angles = angles(arm, &mut || draws.element().circle_point());
+        let angles = closing_angles(arm, &number, &mut |_| draws.element().circle_point());
         let mut vector = || (0..arm.dof()).map(|_| draws.element()).collect::<Vec<Fp>>();
         let (positions, velocities) = (vector(), vector());
         let four = |draws: &mut Draws| std::array::from_fn(|_| draws.element());
@@ -98,9 +99,9 @@ impl<'a> Point<'a> {
         moving.iter().zip(&still).map(|(a, b)| *a - *b).collect()
     }
 
-    /// Every coordinate at zero, and still.
+    /// Every coordinate at zero, or where loops close, and still.
     fn rest(&mut self) {
-        self.angles = angles(self.arm, &mut || (Fp::ZERO, Fp::ONE));
+        self.angles = still_angles(self.arm, &number);
         self.positions.iter_mut().chain(&mut self.velocities).for_each(|x| *x = Fp::ZERO);
     }
 
@@ -116,10 +117,6 @@ impl<'a> Point<'a> {
 /// A number with the prime in its denominator fails the certificate.
 fn number(value: &Rational) -> Fp {
     Fp::from_rational(value).unwrap_or(Fp::ZERO)
-}
-
-fn angles(arm: &Arm, circle: &mut dyn FnMut() -> (Fp, Fp)) -> Vec<(Fp, Fp)> {
-    input_angles(&PrimeField, arm, &number, circle, None)
 }
 
 impl Source<Fp> for Point<'_> {
@@ -148,6 +145,10 @@ impl Source<Fp> for Point<'_> {
     }
     fn exact(&mut self, value: &Rational) -> Fp {
         Fp::from_rational(value).unwrap_or(Fp::ZERO)
+    }
+    fn linkage(&mut self, linkage: &Linkage) -> Option<BarTurns<Fp>> {
+        let turn = self.joint_trig(linkage.joint);
+        turns(&PrimeField, linkage, &number, &turn)
     }
     fn gravity(&mut self, axis: usize) -> Fp {
         Fp::from_rational(&self.arm.gravity[axis]).unwrap_or(Fp::ZERO)

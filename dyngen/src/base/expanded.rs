@@ -1,7 +1,7 @@
 //! The coefficients by expanding the Lagrangian: an independent reference for small arms.
 
 use super::coefficients::{self, Sizes};
-use crate::arm::{Arm, JointKind};
+use crate::arm::{Arm, JointKind, Linkage};
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
 use crate::exact::elimination::SparseRow;
@@ -9,6 +9,7 @@ use crate::exact::polynomial::{Monomial, Numerator, Polynomial, PolynomialRing, 
 use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::lagrangian::elements::{ArmElements, Source, joint_symbols};
+use crate::lagrangian::linkage::BarTurns;
 use crate::lagrangian::twice_lagrangian;
 use std::collections::BTreeMap;
 
@@ -81,6 +82,9 @@ impl Source<Polynomial<i64>> for Variables<'_> {
     fn exact(&mut self, value: &Rational) -> Polynomial<i64> {
         let place = self.couplings.iter().position(|c| c == value);
         self.of(Variable::Coupling(place.unwrap_or_default()))
+    }
+    fn linkage(&mut self, _: &Linkage) -> Option<BarTurns<Polynomial<i64>>> {
+        None
     }
     fn gravity(&mut self, axis: usize) -> Polynomial<i64> {
         self.of(Variable::Gravity(axis))

@@ -6,9 +6,11 @@ pub mod coefficients;
 mod coupled;
 #[cfg(test)]
 mod expanded;
+mod functionals;
 mod plain;
 pub mod preference;
 mod published;
+mod roots;
 pub mod sets;
 mod steps;
 pub mod symmetry;

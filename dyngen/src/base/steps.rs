@@ -5,13 +5,14 @@
 //! be mixed by it, and the elimination would get fractions.
 
 use super::coupled::{CARRIED, Carried, CoupledMotor};
-use crate::arm::{Arm, Convention};
+use crate::arm::{Arm, Convention, Linkage};
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::polynomial::{Monomial, Numerator, Polynomial, PolynomialRing, Square};
 use crate::exact::rational::{self, Rational};
 use crate::exact::symbols::AngleSymbols;
 use crate::lagrangian::elements::{ArmElements, JointElements, Source, turn_x};
+use crate::lagrangian::linkage::BarTurns;
 use crate::lagrangian::{Motion, link_columns, step};
 use std::collections::BTreeMap;
 
@@ -136,6 +137,10 @@ impl Source<Numerator> for Quantities<'_> {
     }
     fn exact(&mut self, value: &Rational) -> Numerator {
         self.ring.constant(value.clone())
+    }
+    // Arms with bars have their rows by poses.
+    fn linkage(&mut self, _: &Linkage) -> Option<BarTurns<Numerator>> {
+        None
     }
     fn gravity(&mut self, axis: usize) -> Numerator {
         self.ring.constant(self.arm.gravity[axis].clone())

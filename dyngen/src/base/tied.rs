@@ -1,5 +1,5 @@
-//! The rows of an arm some of whose joints follow others: the Lagrangian at poses and motions with exact
-//! numbers.
+//! The rows of an arm with closed loops, or some of whose joints follow others: the Lagrangian at poses and
+//! motions with exact numbers.
 //!
 //! Functionals of one joint each, of which [`super::coefficients`] makes its rows, are not enough where
 //! joints move together. Any functions span the space of their values at enough points, so rows are taken at
@@ -7,8 +7,9 @@
 //! modulo the prime. The rows are certified like all others.
 
 use super::certificate;
+use super::functionals::{Formal, Functionals, Monomial, Polynomial, Variable, variable};
 use super::steps::Sizes;
-use crate::arm::{Arm, Drive};
+use crate::arm::{Arm, Drive, Linkage};
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::elimination::{Echelon, SparseRow, Unproven};
@@ -17,15 +18,19 @@ use crate::exact::rational::{self, Rational};
 use crate::exact::symbols::AngleSymbols;
 use crate::lagrangian::elements::{ArmElements, Source};
 use crate::lagrangian::followers::{input_angles, with_theta};
+use crate::lagrangian::linkage::{BarTurn, BarTurns};
 use crate::lagrangian::twice_lagrangian;
 use dashu_int::IBig;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Angles that are larger multiples of parts of each other are as good as free.
-const LARGEST: u32 = 12;
+pub(super) const LARGEST: u32 = 12;
 /// Points that are tried for each row at most.
 const TRIES: usize = 400;
 /// Points at quarter turns alone, before others are drawn too.
-const SIMPLE: usize = 60;
+pub(super) const SIMPLE: usize = 60;
+/// Points at which monomials of the columns are looked for: at each of them a few may vanish by chance.
+const SAMPLES: usize = 8;
 
 /// Rows that span the row space of all the arm's parameters, whether declared zero or not.
 ///
@@ -43,27 +48,39 @@ pub(super) fn all_rows(
     let mut rows: Vec<SparseRow> = Vec::new();
     // A number with the prime in its denominator fails the certificate.
     let residue = |x: &Rational| Fp::from_rational(x).unwrap_or(Fp::ZERO);
+    let modular = Algebraic {
+        alg: &PrimeField,
+        arm,
+        symbols,
+        number: &residue,
+        symbol: &|index, sine| field.modular_symbol(index, sine),
+    };
+    let exact = Algebraic {
+        alg: field,
+        arm,
+        symbols,
+        number: &|x: &Rational| field.rational(x.clone()),
+        symbol: &|index, sine| field.whole(field.symbol(index, sine).clone()),
+    };
+    let monomials =
+        (0..SAMPLES).flat_map(|k| modular.columns(&Point::draw(arm, sizes, SIMPLE + k, &mut draws)));
+    let monomials: BTreeSet<Monomial> = monomials.flat_map(BTreeMap::into_keys).collect();
+    let functionals = Functionals::new(arm, field, &monomials, |k| Point::draw(arm, sizes, k, &mut draws))?;
     for attempt in 0..TRIES * wanted {
         if rows.len() == wanted {
             break;
         }
         let point = Point::draw(arm, sizes, attempt, &mut draws);
-        let modular = Algebraic {
-            alg: &PrimeField,
-            arm,
-            symbols,
-            number: &residue,
-            symbol: &|index, sine| field.modular_symbol(index, sine),
-        };
-        if echelon.takes(modular.columns(&point)) {
-            let exact = Algebraic {
-                alg: field,
-                arm,
-                symbols,
-                number: &|x: &Rational| field.rational(x.clone()),
-                symbol: &|index, sine| field.whole(field.symbol(index, sine).clone()),
-            };
-            let row: Vec<Constant> = exact.columns(&point);
+        let rest = point.at_rest();
+        let [moving, still] = [&point, &rest].map(|point| functionals.terms(modular.columns(point)));
+        let is_new = |product: &Vec<usize>| echelon.takes(functionals.modular(product, &moving, &still));
+        let taken: Vec<Vec<usize>> = functionals.products(&mut draws).into_iter().filter(is_new).collect();
+        if taken.is_empty() {
+            continue;
+        }
+        let [moving, still] = [&point, &rest].map(|point| functionals.terms(exact.columns(point)));
+        for product in taken {
+            let row = functionals.exact(field, &product, &moving, &still);
             let entries: Vec<(usize, &Constant)> =
                 row.iter().enumerate().filter(|(_, c)| !c.is_zero()).collect();
             rows.push(field.clear_denominators(&entries));
@@ -74,12 +91,12 @@ pub(super) fn all_rows(
 
 /// A pose and a motion, and sizes where they are variables, in numbers that are easy to compute with.
 #[derive(Clone)]
-struct Point {
+pub(super) struct Point {
     /// Sines and cosines, as many as there may be free angles.
-    circle: Vec<(Rational, Rational)>,
+    pub(super) circle: Vec<(Rational, Rational)>,
     /// Positions of the coordinates.
-    positions: Vec<Rational>,
-    velocities: Vec<Rational>,
+    pub(super) positions: Vec<Rational>,
+    pub(super) velocities: Vec<Rational>,
     /// Sizes of each joint, if they are variables.
     sizes: Option<Vec<JointSizes>>,
 }
@@ -119,8 +136,8 @@ impl Point {
 
     /// Every coordinate at zero, and still.
     fn at_rest(&self) -> Self {
-        let zeros = |list: &[Rational]| list.iter().map(|_| rational::integer(0)).collect::<Vec<_>>();
         let straight = || (rational::integer(0), rational::integer(1));
+        let zeros = |list: &[Rational]| list.iter().map(|_| rational::integer(0)).collect::<Vec<_>>();
         Point {
             circle: self.circle.iter().map(|_| straight()).collect(),
             positions: zeros(&self.positions),
@@ -140,68 +157,107 @@ struct Algebraic<'a, A: Algebra> {
 }
 
 impl<A: Algebra> Algebraic<'_, A> {
-    /// The columns of all parameters, less what they are at rest: a constant changes no torque.
-    fn columns(&self, point: &Point) -> Vec<A::Value> {
-        let at = |point: &Point| {
-            let mut next = point.circle.iter().map(|(s, c)| ((self.number)(s), (self.number)(c)));
-            let mut circle = || next.next().unwrap_or_else(|| (self.alg.integer(0), self.alg.integer(1)));
-            let angles = input_angles(self.alg, self.arm, self.number, &mut circle, Some(LARGEST));
-            let mut source = Quantities { algebraic: self, point, drives: self.arm.drives(), angles };
-            let elements = ArmElements::build(self.alg, self.arm, self.symbols, &mut source);
-            twice_lagrangian(self.alg, &elements)
-        };
-        let (moving, still) = (at(point), at(&point.at_rest()));
-        moving.iter().zip(&still).map(|(a, b)| self.alg.sub(a, b)).collect()
+    /// The columns of all parameters, as polynomials in what moves with linkages.
+    fn columns(&self, point: &Point) -> Vec<Polynomial<A::Value>> {
+        let formal = Formal(self.alg);
+        let number = |x: &Rational| formal.constant((self.number)(x));
+        let mut next = point.circle.iter().map(|(s, c)| (number(s), number(c)));
+        let mut circle = || next.next().unwrap_or_else(|| (formal.integer(0), formal.integer(1)));
+        let angles = input_angles(&formal, self.arm, &number, &mut circle, Some(LARGEST));
+        let drives = self.arm.drives();
+        let mut source = Quantities { algebraic: self, formal: &formal, point, drives, angles };
+        let elements = ArmElements::build(&formal, self.arm, self.symbols, &mut source);
+        twice_lagrangian(&formal, &elements)
     }
 }
+
+/// Sine and cosine of an angle.
+type SineCosine<V> = (Polynomial<V>, Polynomial<V>);
 
 /// The quantities of an arm at a point that the Lagrangian needs.
 struct Quantities<'a, 'b, A: Algebra> {
     algebraic: &'a Algebraic<'b, A>,
+    formal: &'a Formal<'b, A>,
     point: &'a Point,
     drives: Vec<Drive>,
-    angles: Vec<(A::Value, A::Value)>,
+    angles: Vec<SineCosine<A::Value>>,
 }
 
 impl<A: Algebra> Quantities<'_, '_, A> {
+    fn number(&self, value: &Rational) -> Polynomial<A::Value> {
+        self.formal.constant((self.algebraic.number)(value))
+    }
+
+    /// The variables of a joint that moves with a linkage.
+    fn moving<const N: usize>(
+        &self,
+        joint: usize,
+        which: [Variable; N],
+    ) -> Option<[Polynomial<A::Value>; N]> {
+        let moves = Functionals::has(self.algebraic.arm, &self.drives, joint);
+        moves.then(|| which.map(|which| self.formal.variable(variable(joint, which))))
+    }
+
     /// A size of a joint: the point's where it is a variable, else the arm's.
-    fn size(&self, joint: usize, variable: fn(&JointSizes) -> &Rational, value: &Rational) -> A::Value {
-        (self.algebraic.number)(self.point.sizes.as_ref().map_or(value, |sizes| variable(&sizes[joint])))
+    fn size(
+        &self,
+        joint: usize,
+        variable: fn(&JointSizes) -> &Rational,
+        value: &Rational,
+    ) -> Polynomial<A::Value> {
+        self.number(self.point.sizes.as_ref().map_or(value, |sizes| variable(&sizes[joint])))
     }
 }
 
-impl<A: Algebra> Source<A::Value> for Quantities<'_, '_, A> {
-    fn joint_trig(&mut self, joint: usize) -> (A::Value, A::Value) {
-        with_theta(self.algebraic.alg, &self.algebraic.arm.joints[joint].theta, self.angles[joint].clone())
+impl<A: Algebra> Source<Polynomial<A::Value>> for Quantities<'_, '_, A> {
+    fn joint_trig(&mut self, joint: usize) -> (Polynomial<A::Value>, Polynomial<A::Value>) {
+        if let Some(found) = self.moving(joint, [Variable::Sine, Variable::Cosine]) {
+            let [sine, cosine] = found;
+            return (sine, cosine);
+        }
+        with_theta(self.formal, &self.algebraic.arm.joints[joint].theta, self.angles[joint].clone())
     }
-    fn position(&mut self, joint: usize) -> A::Value {
+    fn position(&mut self, joint: usize) -> Polynomial<A::Value> {
+        if let Some([position]) = self.moving(joint, [Variable::Position]) {
+            return position;
+        }
         let drive = &self.drives[joint];
-        (self.algebraic.number)(&(&drive.ratio * &self.point.positions[drive.coordinate] + &drive.offset))
+        self.number(&(&drive.ratio * &self.point.positions[drive.coordinate] + &drive.offset))
     }
-    fn velocity(&mut self, joint: usize) -> A::Value {
+    fn velocity(&mut self, joint: usize) -> Polynomial<A::Value> {
+        if let Some([velocity]) = self.moving(joint, [Variable::Velocity]) {
+            return velocity;
+        }
         let drive = &self.drives[joint];
-        (self.algebraic.number)(&(&drive.ratio * &self.point.velocities[drive.coordinate]))
+        self.number(&(&drive.ratio * &self.point.velocities[drive.coordinate]))
     }
-    fn a(&mut self, joint: usize) -> A::Value {
+    fn a(&mut self, joint: usize) -> Polynomial<A::Value> {
         self.size(joint, |sizes| &sizes.a, &self.algebraic.arm.joints[joint].a)
     }
-    fn b(&mut self, joint: usize) -> A::Value {
+    fn b(&mut self, joint: usize) -> Polynomial<A::Value> {
         self.size(joint, |sizes| &sizes.b, &self.algebraic.arm.joints[joint].b)
     }
-    fn d(&mut self, joint: usize) -> A::Value {
+    fn d(&mut self, joint: usize) -> Polynomial<A::Value> {
         self.size(joint, |sizes| &sizes.d, &self.algebraic.arm.joints[joint].d)
     }
-    fn ratio(&mut self, joint: usize) -> A::Value {
+    fn ratio(&mut self, joint: usize) -> Polynomial<A::Value> {
         let ratio = self.algebraic.arm.joints[joint].rotor_ratio.clone().unwrap_or_default();
         self.size(joint, |sizes| &sizes.rotor_ratio, &ratio)
     }
-    fn exact(&mut self, value: &Rational) -> A::Value {
-        (self.algebraic.number)(value)
+    fn exact(&mut self, value: &Rational) -> Polynomial<A::Value> {
+        self.number(value)
     }
-    fn gravity(&mut self, axis: usize) -> A::Value {
-        (self.algebraic.number)(&self.algebraic.arm.gravity[axis])
+    fn linkage(&mut self, linkage: &Linkage) -> Option<BarTurns<Polynomial<A::Value>>> {
+        let bar = |first: usize| {
+            let of = |k: usize| self.formal.variable(variable(linkage.joint, Variable::Bar(first + k)));
+            BarTurn { sin: of(0), cos: of(1), rate: of(2), bend: self.formal.integer(0) }
+        };
+        Some([bar(0), bar(3)])
     }
-    fn symbol(&mut self, index: usize, sine: bool) -> A::Value {
-        (self.algebraic.symbol)(index, sine)
+    fn gravity(&mut self, axis: usize) -> Polynomial<A::Value> {
+        self.number(&self.algebraic.arm.gravity[axis])
+    }
+    fn symbol(&mut self, index: usize, sine: bool) -> Polynomial<A::Value> {
+        self.formal.constant((self.algebraic.symbol)(index, sine))
     }
 }

@@ -185,11 +185,14 @@ fn bars(t: &mut String, arm: &Arm, digits: Digits) {
         let pin = bar.pin.each_ref().map(|x| digits.number(rational::to_f64(x)));
         let _ = writeln!(
             t,
-            "  body {number}: bar {}, from a pin at [{}] m on {}; its axes are those of {}",
+            "  body {number}: bar {}, from a pin at [{}] m on {}; {}",
             bar.name,
             pin.join(", "),
             link(bar.carrier),
-            link(bar.parallel)
+            match &bar.hinge {
+                None => format!("its axes are those of {}", link(bar.parallel)),
+                Some(hinge) => format!("it turns there with joint {}, x along it", hinge.linkage.joint + 1),
+            }
         );
     }
 }
@@ -249,9 +252,14 @@ fn choice_of_columns(t: &mut String, model: &Model) {
 /// What each function costs.
 fn operation_table(t: &mut String, operations: &[(&'static str, Operations)]) {
     let _ = writeln!(t, "\noperations with the minimal set as arguments:");
-    let _ = writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", "function", "mul", "add", "div", "sin_cos");
+    // Only loops that are no parallelograms have roots.
+    let has_roots = operations.iter().any(|(_, o)| o.sqrt > 0);
+    let roots = |text: String| if has_roots { format!(" {text:>5}") } else { String::new() };
+    let head = roots("sqrt".to_string());
+    let _ = writeln!(t, "  {:<20} {:>6} {:>6} {:>5}{head} {:>8}", "function", "mul", "add", "div", "sin_cos");
     for (function, o) in operations {
-        let _ = writeln!(t, "  {:<20} {:>6} {:>6} {:>5} {:>8}", function, o.mul, o.add, o.div, o.sin_cos);
+        let (sqrt, trig) = (roots(o.sqrt.to_string()), o.sin_cos);
+        let _ = writeln!(t, "  {:<20} {:>6} {:>6} {:>5}{sqrt} {trig:>8}", function, o.mul, o.add, o.div);
     }
 }
 

@@ -50,12 +50,13 @@ pub(super) fn run(args: &Args) -> Result<ExitCode, Failure> {
     for earlier in 0..=count {
         let name = if earlier == 0 { "build" } else { PASSES[earlier - 1].0 };
         let graph = if earlier == count { built.clone() } else { after(earlier)? };
-        let Operations { mul, add, div, sin_cos } = graph.operations();
+        let Operations { mul, add, div, sqrt, sin_cos } = graph.operations();
+        let roots = if sqrt > 0 { format!("{sqrt} sqrt, ") } else { String::new() };
         let all = graph.graph.operations(&graph.outputs);
         // A String takes every write.
         let _ = writeln!(
             text,
-            "# after {name}: {mul} mul, {add} add, {div} div, {sin_cos} sin_cos; of the parameters alone: {} \
+            "# after {name}: {mul} mul, {add} add, {div} div, {roots}{sin_cos} sin_cos; of the parameters alone: {} \
                 mul, {} add",
             all.mul - mul,
             all.add - add
@@ -88,6 +89,7 @@ fn listing(built: &FunctionGraph, parameters: &[String]) -> String {
             Node::Add(a, b) => format!("{} + {}", signed(a), signed(b)),
             Node::Mul(a, b) => format!("{} * {}", signed(a), signed(b)),
             Node::Div(a, b) => format!("{} / {}", signed(a), signed(b)),
+            Node::Sqrt(a) => format!("sqrt({})", signed(a)),
             _ => continue,
         };
         let _ = writeln!(text, "x{node} = {line}");

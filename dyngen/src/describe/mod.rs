@@ -102,7 +102,11 @@ impl Description {
             .operations
             .iter()
             .map(|(f, o)| {
-                ((*f).to_string(), json!({"mul": o.mul, "add": o.add, "div": o.div, "sin_cos": o.sin_cos}))
+                let mut counts = json!({"mul": o.mul, "add": o.add, "div": o.div, "sin_cos": o.sin_cos});
+                if o.sqrt > 0 {
+                    counts["sqrt"] = o.sqrt.into();
+                }
+                ((*f).to_string(), counts)
             })
             .collect();
         let choice: Vec<Value> = (model.sets().candidates.iter())
@@ -177,13 +181,19 @@ fn mimics_json(arm: &Arm) -> Vec<Value> {
     arm.joints.iter().enumerate().filter_map(of).collect()
 }
 
-/// Bars of closed loops: bodies and links from 1, 0 is the base; the pin as exact text, m.
+/// Bars of closed loops: bodies, links and joints from 1, 0 is the base; the pin as exact text, m.
 fn bars_json(arm: &Arm) -> Vec<Value> {
     let number = |link: Option<usize>| link.map_or(0, |link| link + 1);
     let of = |(bar, body): (&Bar, usize)| {
         let pin = bar.pin.each_ref().map(rational::to_text);
         let (link, parallel) = (number(bar.carrier), number(bar.parallel));
-        json!({"name": bar.name, "body": body, "link": link, "pin": pin, "parallel": parallel})
+        match &bar.hinge {
+            None => json!({"name": bar.name, "body": body, "link": link, "pin": pin, "parallel": parallel}),
+            Some(hinge) => {
+                let joint = hinge.linkage.joint + 1;
+                json!({"name": bar.name, "body": body, "link": link, "pin": pin, "turned_by": joint})
+            }
+        }
     };
     arm.bars.iter().zip(arm.links() + 1..).map(of).collect()
 }

@@ -4,6 +4,9 @@
 //! pin, and its moment on the other: v·f + ω·n is its power, whatever moves. The forces in its pins never
 //! appear. With these two wrenches the recursion gives the torques of bars; the matrices follow from it
 //! column by column.
+//!
+//! A bar of a linkage turns on the link that carries its pin, at ρ(q)·q̇ about the axis of the linkage's
+//! joint. Its whole wrench acts on that link, and ρ times the moment about the axis on the joint.
 
 use super::body::{Vector, ZERO};
 use super::chain::LinkGeometry;
@@ -18,7 +21,7 @@ use super::wrench::Wrench;
 use crate::exact::algebra::Algebra;
 use crate::exact::rational;
 use crate::graph::{Builder, Expr, differentiate};
-use crate::lagrangian::bars::BarElements;
+use crate::lagrangian::bars::{BarElements, HingeElements};
 use crate::lagrangian::elements::{turn_x, turn_z};
 
 /// A bar in the axes of the chain.
@@ -34,8 +37,56 @@ pub struct BarBody {
     /// link back.
     file_turn: SinCos,
     last_turn: SinCos,
-    /// The bar's body about the pin, in the chain's axes of the link that it turns with.
+    /// How it turns on that link, where it does.
+    hinge: Option<Hinge>,
+    /// The bar's body about the pin, in the chain's axes of the link that it turns with; where it has a hinge
+    /// in those axes turned so that z is the hinge's axis.
     moments: Moments<Expr>,
+}
+
+/// A bar's own turn on a link.
+#[derive(Clone, Debug)]
+struct Hinge {
+    /// The joint that turns it.
+    joint: usize,
+    /// The turn about x from the chain's axes of the link to those whose z is the axis.
+    twist: SinCos,
+    /// Whether that z points against the joint's axis.
+    reversed: bool,
+    /// From there to the bar's axes, seen about the joint's axis.
+    turn: SinCos,
+    /// Derivatives of the bar's angle by the joint's, about that z.
+    rate: Expr,
+    bend: Expr,
+}
+
+impl Hinge {
+    fn new(links: &[LinkGeometry<Expr>], hinge: &HingeElements<Expr>) -> Hinge {
+        let HingeElements { joint, rocker, ref turn, .. } = *hinge;
+        let reversed = links[joint].reversed;
+        let signed = |x: Expr| if reversed { -x } else { x };
+        Hinge {
+            joint,
+            // Links behind the joint have its axis.
+            twist: if rocker { links[joint].twist } else { STRAIGHT },
+            reversed,
+            turn: (turn.sin, turn.cos),
+            rate: signed(turn.rate),
+            bend: signed(turn.bend),
+        }
+    }
+
+    /// How a bar moves on a link that moves.
+    fn on(&self, b: &Builder, link: &LinkMotion, drive: &Drive) -> LinkMotion {
+        let Hinge { joint, twist: (sin, cos), rate, bend, .. } = *self;
+        let [velocity, reference, acceleration] =
+            [&drive.velocities, &drive.reference, &drive.accelerations].map(|rates| rates[joint]);
+        let of_speed = b.mul(&bend, &b.mul(&velocity, &reference));
+        let acceleration = b.add(&b.mul(&rate, &acceleration), &of_speed);
+        let [velocity, reference] = [velocity, reference].map(|speed| b.mul(&rate, &speed));
+        let spin = link.spin.turned_x(b, self.twist).joined(b, STRAIGHT, velocity, reference, acceleration);
+        LinkMotion { spin, acceleration: turn_x(b, &sin, &cos, &link.acceleration), next: ZERO }
+    }
 }
 
 impl BarBody {
@@ -52,14 +103,22 @@ impl BarBody {
         });
         let file_turn = bar.parallel.map_or(STRAIGHT, |link| links[link].file_turn);
         let (carrier, parallel, last_turn) = (bar.carrier, bar.parallel, last_turn(bar.parallel));
-        BarBody { carrier, pin, parallel, file_turn, last_turn, moments: Moments::none(b) }
+        let hinge = bar.hinge.as_ref().map(|hinge| Hinge::new(links, hinge));
+        BarBody { carrier, pin, parallel, file_turn, last_turn, hinge, moments: Moments::none(b) }
     }
 
     /// This bar with the ten inertial parameters of its body.
     pub fn carrying(&self, b: &Builder, parameters: &[Expr; ENTRIES]) -> BarBody {
         let half = b.constant(&rational::ratio(1, 2));
         let ((s, c), (t, d)) = (self.file_turn, self.last_turn);
-        let body = Moments::of_parameters(b, &half, parameters).turned_back_x(b, &s, &c);
+        let body = Moments::of_parameters(b, &half, parameters);
+        let body = match &self.hinge {
+            None => body.turned_back_x(b, &s, &c),
+            Some(Hinge { turn: (sin, cos), reversed, .. }) => {
+                let body = body.turned_back_z(b, sin, cos);
+                if *reversed { body.turned_back_x(b, &Expr::ZERO, &-Expr::ONE) } else { body }
+            }
+        };
         BarBody { moments: body.turned_back_z(b, &t, &d), ..self.clone() }
     }
 
@@ -69,9 +128,15 @@ impl BarBody {
     }
 }
 
-/// What bars exert on each link about its origin, in its axes.
-pub fn wrenches(b: &Builder, chain: &Chain, motions: &[StageMotion], drive: &Drive) -> Vec<Wrench> {
+/// What bars exert on each link about its origin, in its axes, and on each joint.
+pub fn wrenches(
+    b: &Builder,
+    chain: &Chain,
+    motions: &[StageMotion],
+    drive: &Drive,
+) -> (Vec<Wrench>, Vec<Expr>) {
     let mut sums = vec![Wrench::NONE; chain.dof()];
+    let mut torques = vec![Expr::ZERO; chain.dof()];
     let motion = |link: Option<usize>| match link.and_then(|link| place(chain, link)) {
         Some((s, k)) => motions[s].links[k],
         None => {
@@ -83,7 +148,16 @@ pub fn wrenches(b: &Builder, chain: &Chain, motions: &[StageMotion], drive: &Dri
         let (carrier, parallel) = (motion(bar.carrier), motion(bar.parallel));
         let of_pin = plus(b, &carrier.acceleration, &carrier.spin.times(b, &bar.pin));
         let acceleration = turned(b, chain, &of_pin, bar.carrier, bar.parallel);
-        let own = moments_wrench(b, &bar.moments, &LinkMotion { acceleration, ..parallel });
+        let with = LinkMotion { acceleration, ..parallel };
+        let own = match &bar.hinge {
+            None => moments_wrench(b, &bar.moments, &with),
+            Some(hinge) => {
+                let own = moments_wrench(b, &bar.moments, &hinge.on(b, &with, drive));
+                let torque = &mut torques[hinge.joint];
+                *torque = b.add(torque, &b.mul(&hinge.rate, &own.moment[2]));
+                own.turned_back_x(b, hinge.twist)
+            }
+        };
         if let Some(link) = bar.carrier {
             let force = turned(b, chain, &own.force, bar.parallel, bar.carrier);
             let at_pin = Wrench { force, moment: ZERO }.shifted(b, &bar.pin);
@@ -93,7 +167,7 @@ pub fn wrenches(b: &Builder, chain: &Chain, motions: &[StageMotion], drive: &Dri
             sums[link] = sums[link].plus(b, &Wrench { force: ZERO, moment: own.moment });
         }
     }
-    sums
+    (sums, torques)
 }
 
 /// Stage and member of a link.

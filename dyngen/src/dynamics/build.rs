@@ -11,7 +11,7 @@ use super::stage::{Chain, Form};
 use super::task::{Task, sum_of_products};
 use super::total::Total;
 use super::{bars, composite, coriolis, energy, forward, inverse, momentum, payload, pose, regressor};
-use crate::arm::{Arm, Parameter, Placement};
+use crate::arm::{Arm, Linkage, Parameter, Placement};
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::ConstantField;
 use crate::exact::elimination::Dependence;
@@ -20,6 +20,7 @@ use crate::exact::symbols::AngleSymbols;
 use crate::graph::differentiate::{self, Direction};
 use crate::graph::{Builder, Contraction, Expr, Graph, Input, Operations, Preparation};
 use crate::lagrangian::elements::{ArmElements, PlacementElements, Source};
+use crate::lagrangian::linkage::{BarTurns, turns};
 use crate::optimize::{self, COMPARED, Pass};
 use crate::parameters::{ParameterSet, SetParameter};
 
@@ -591,6 +592,10 @@ impl Source<Expr> for Inputs<'_> {
     }
     fn exact(&mut self, value: &Rational) -> Expr {
         self.b.constant(value)
+    }
+    fn linkage(&mut self, linkage: &Linkage) -> Option<BarTurns<Expr>> {
+        let turn = self.joint_trig(linkage.joint);
+        turns(self.b, linkage, &|x| self.b.constant(x), &turn)
     }
     fn gravity(&mut self, axis: usize) -> Expr {
         self.b.constant(&self.arm.gravity[axis])

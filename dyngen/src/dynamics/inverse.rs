@@ -43,10 +43,11 @@ pub fn inverse_dynamics(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: 
 /// The motion outwards, forces and moments inwards.
 pub fn newton_euler(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: &Drive) -> Passes {
     let motions = motions(b, chain, drive);
-    let of_bars = bars::wrenches(b, chain, &motions, drive);
+    let (of_bars, of_hinges) = bars::wrenches(b, chain, &motions, drive);
     let mut felt = Vec::with_capacity(chain.stages.len());
     let mut torques = vec![Expr::ZERO; chain.dof()];
-    let mut of_coupled = torques.clone();
+    // What acts on joints directly: of motors that turn with several, and of bars that joints turn.
+    let mut directly = of_hinges;
     let mut outer = Wrench::NONE;
     for (stage, motion) in chain.stages.iter().zip(&motions).rev() {
         let (own, mut before) = match stage.kind {
@@ -67,7 +68,7 @@ pub fn newton_euler(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: &Dri
                 let turning = b.add(&b.mul(&ratio, &ddq), &b.add(&alpha, &inner));
                 let of_motor = b.mul(&rotor, &turning);
                 match member.coupled {
-                    Some(_) => member.add_coupled_torque(b, of_motor, &mut of_coupled),
+                    Some(_) => member.add_coupled_torque(b, of_motor, &mut directly),
                     None => torque = b.add(&torque, &of_motor),
                 }
                 // It turns the link before: within the stage that is what the inner coordinates feel.
@@ -96,7 +97,7 @@ pub fn newton_euler(b: &Builder, chain: &Chain, bodies: &[LinkBody], drive: &Dri
         felt.push(own);
     }
     felt.reverse();
-    let torques = torques.iter().zip(&of_coupled).map(|(own, coupled)| b.add(own, coupled)).collect();
+    let torques = torques.iter().zip(&directly).map(|(own, more)| b.add(own, more)).collect();
     Passes { torques, motions, felt }
 }
 

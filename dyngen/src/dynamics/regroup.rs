@@ -8,7 +8,7 @@
 use super::body::constant;
 use super::chain::{self, LinkGeometry, Origins};
 use super::moments::{ENTRIES, Moments};
-use crate::arm::{Arm, JointKind, Parameter, ParameterKind};
+use crate::arm::{Arm, JointKind, Linkage, Parameter, ParameterKind};
 use crate::exact::algebra::Algebra;
 use crate::exact::constant::{Constant, ConstantField};
 use crate::exact::elimination::{self, Dependence};
@@ -16,6 +16,7 @@ use crate::exact::rational::{self, Rational};
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::{Builder, Expr};
 use crate::lagrangian::elements::{ArmElements, Source};
+use crate::lagrangian::linkage::BarTurns;
 use crate::parameters::{Combination, ParameterSet, minimal_coordinates};
 
 /// The contribution of a link to the dynamics.
@@ -159,6 +160,9 @@ impl Source<Constant> for Constants<'_> {
     }
     fn exact(&mut self, value: &Rational) -> Constant {
         self.number(value)
+    }
+    fn linkage(&mut self, _: &Linkage) -> Option<BarTurns<Constant>> {
+        None
     }
     fn gravity(&mut self, axis: usize) -> Constant {
         self.number(&self.arm.gravity[axis])

@@ -12,7 +12,7 @@ use crate::arm::{Convention, Parameter, ParameterKind};
 use crate::exact::algebra::Algebra;
 use crate::exact::rational;
 use crate::graph::{Builder, Expr};
-use crate::lagrangian::bars::{BarElements, turned};
+use crate::lagrangian::bars::{BarElements, HingeElements, turned};
 use crate::lagrangian::elements::{ArmElements, JointElements, PlacementElements};
 use crate::lagrangian::{Motion, motions};
 
@@ -123,6 +123,12 @@ impl Total {
 
 /// A bar in frame 0: what moves with its pin, and what turns with its parallel link.
 fn of_bar(b: &Builder, arm: &ArmElements<Expr>, bar: &BarElements<Expr>, body: &Moments<Expr>) -> [Total; 2] {
+    let body = &match &bar.hinge {
+        Some(HingeElements { tilt: (s, c), turn, .. }) => {
+            body.turned_back_z(b, &turn.sin, &turn.cos).turned_back_x(b, s, c)
+        }
+        None => body.clone(),
+    };
     let momenta = (0..arm.joints.len()).map(|j| unit_momenta(b, arm, bar, body, j));
     let (of_pin, of_turn) = momenta.unzip();
     let none = Moments::none(b);
@@ -148,7 +154,7 @@ fn unit_momenta(
         of.velocity = if i == joint { Expr::ONE } else { Expr::ZERO };
     }
     let rest = Motion::base(b, &moving);
-    let Motion { omega, velocity, .. } = bar.motion(b, arm, &rest, &motions(b, &moving));
+    let Motion { omega, velocity, .. } = bar.motion_at_pin(b, &moving, &rest, &motions(b, &moving));
     let linear = plus(b, &scaled(b, body.mass, &velocity), &b.cross(&omega, &body.first));
     let angular = plus(b, &body.inertia_times(b, &omega), &b.cross(&body.first, &velocity));
     let force = turned(b, arm, &linear, bar.parallel, bar.carrier);

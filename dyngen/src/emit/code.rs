@@ -271,6 +271,11 @@ fn statement(model: &Model, graph: &Graph, node: usize, form: &Form) -> Option<T
             let (x, y) = two(x, y);
             quote!(let #name = #x / #y;)
         }
+        Value::Root { of, negative } => {
+            let of = ident(of);
+            let of = if negative { quote!((-#of)) } else { quote!(#of) };
+            quote!(let #name = #of.simd_sqrt();)
+        }
         Value::Fused { factors: [x, y], addend, negative: [product, other] } => {
             let (x, y) = two(x, y);
             let addend = ident(addend);

@@ -77,8 +77,8 @@ pub(super) fn function(built: &FunctionGraph) -> String {
     let arguments: String =
         built.function.arguments().iter().map(|a| format!("\n* `{}`: {}", a.name(), a.meaning())).collect();
     let operations = built.operations();
-    let divisions =
-        if operations.div > 0 { format!(", {} divisions", operations.div) } else { String::new() };
+    let counted = |count: usize, what| if count > 0 { format!(", {count} {what}") } else { String::new() };
+    let divisions = counted(operations.div, "divisions") + &counted(operations.sqrt, "square roots");
     let fused = match built.contraction().count() {
         0 => String::new(),
         count => format!("\n{count} of the multiplications are formed within additions."),

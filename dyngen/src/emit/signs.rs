@@ -59,6 +59,7 @@ fn assign(graph: &Graph, needed: &[usize], wishes: &[bool]) -> Vec<bool> {
                 _ => wishes[*node] == b.is_negative(),
             },
             Node::Mul(a, b) | Node::Div(a, b) => signs[a.node()] != signs[b.node()],
+            // A root has the sign that it has.
             _ => false,
         };
     }

@@ -21,6 +21,8 @@ pub(super) enum Value {
     Product(String, String),
     /// a/b
     Quotient(String, String),
+    /// √a or √−a
+    Root { of: String, negative: bool },
     /// ±a·b ± c, rounded once; whether the product and c are taken with minus.
     Fused { factors: [String; 2], addend: String, negative: [bool; 2] },
 }
@@ -99,6 +101,7 @@ pub(super) fn value(model: &Model, graph: &Graph, node: usize, form: &Form) -> O
         }
         Node::Mul(a, b) => Value::Product(name(a.node()), name(b.node())),
         Node::Div(a, b) => Value::Quotient(name(a.node()), name(b.node())),
+        Node::Sqrt(a) => Value::Root { of: name(a.node()), negative: signs[a.node()] != a.is_negative() },
     })
 }
 

@@ -18,6 +18,8 @@ pub(super) struct Syntax {
     pub(super) number: fn(f64) -> String,
     /// The function that gives a·b + c.
     pub(super) fused: &'static str,
+    /// The function that gives √a.
+    pub(super) root: &'static str,
 }
 
 impl Syntax {
@@ -37,6 +39,9 @@ impl Syntax {
                 Value::NegativeSum(x, y) => format!("-{x} - {y}"),
                 Value::Product(x, y) => format!("{x} * {y}"),
                 Value::Quotient(x, y) => format!("{x} / {y}"),
+                Value::Root { of, negative } => {
+                    format!("{}({}{of})", self.root, if negative { "-" } else { "" })
+                }
                 Value::Fused { factors: [x, y], addend, negative } => {
                     let [first, third] = negative.map(|minus| if minus { "-" } else { "" });
                     format!("{}({first}{x}, {y}, {third}{addend})", self.fused)

@@ -2,9 +2,10 @@
 //! floating point.
 
 use super::Options;
-use crate::arm::{Arm, ParameterKind};
+use crate::arm::{Arm, Linkage, ParameterKind};
 use crate::consistency;
 use crate::dynamics::Function;
+use crate::exact::rational::to_f64;
 use crate::model::{Error, Model};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
@@ -41,7 +42,7 @@ pub(super) fn module(model: &Model, options: &Options) -> Result<TokenStream, Er
         return Ok(quote!());
     }
     let parameters = (!baked).then(|| parameters(&values));
-    let support = support();
+    let support = support(model.arm());
     Ok(quote! {
         #[cfg(test)]
         mod tests {
@@ -151,8 +152,33 @@ fn parameters(values: &[f64]) -> TokenStream {
     }
 }
 
+/// Lines that move coordinates of some q to where loops close: about the middle of their joints' limits.
+fn where_loops_close(arm: &Arm) -> Option<TokenStream> {
+    let drives = arm.drives();
+    let line = |linkage: &Linkage| {
+        let drive = &drives[linkage.joint];
+        let (ratio, offset) = (to_f64(&drive.ratio), to_f64(&drive.offset));
+        let [lower, upper] = arm.joints[linkage.joint].position?.map(|x| (x - offset) / ratio);
+        // States are within 1.5.
+        let [middle, factor] =
+            [0.5 * (lower + upper), (upper - lower).abs() / 6.0].map(Literal::f64_suffixed);
+        let coordinate = Literal::usize_unsuffixed(drive.coordinate);
+        Some(quote!(q[#coordinate] = #middle + #factor * q[#coordinate];))
+    };
+    let lines: Vec<TokenStream> = arm.linkages().filter_map(line).collect();
+    (!lines.is_empty()).then(|| {
+        quote! {
+            .map(|[mut q, dq, ddq]| {
+                #(#lines)*
+                [q, dq, ddq]
+            })
+        }
+    })
+}
+
 /// The states that tests take, and how they compare.
-fn support() -> TokenStream {
+fn support(arm: &Arm) -> TokenStream {
+    let where_loops_close = where_loops_close(arm);
     quote! {
         /// Positions, velocities, and accelerations or torques.
         fn states() -> impl Iterator<Item = [SVector<f64, JOINTS>; 3]> {
@@ -165,6 +191,7 @@ fn support() -> TokenStream {
                     })
                 })
             })
+            #where_loops_close
         }
 
         fn assert_close<const R: usize, const C: usize>(

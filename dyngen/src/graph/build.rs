@@ -1,7 +1,7 @@
 //! Building expressions: each once, folded when it is built.
 
 use super::{Expr, Graph, Input, Node};
-use crate::exact::algebra::Algebra;
+use crate::exact::algebra::{Algebra, Inverses, Roots};
 use crate::exact::rational::{self, Rational};
 use num_traits::{One, Signed, Zero};
 use rustc_hash::FxHashMap;
@@ -71,6 +71,11 @@ impl Builder {
         if negative { -quotient } else { quotient }
     }
 
+    /// √a
+    pub fn sqrt(&self, a: Expr) -> Expr {
+        self.graph.borrow_mut().intern(Node::Sqrt(a))
+    }
+
     /// A node of another graph, whose operands have been copied.
     pub fn copy_node(&self, graph: &Graph, node: usize, copied: &[Expr]) -> Expr {
         self.copy_node_with(graph, node, |e| copied[e.node()])
@@ -86,6 +91,7 @@ impl Builder {
             Node::Add(x, y) => self.add(&of(x), &of(y)),
             Node::Mul(x, y) => self.mul(&of(x), &of(y)),
             Node::Div(x, y) => self.div(of(x), of(y)),
+            Node::Sqrt(x) => self.sqrt(of(x)),
         }
     }
 
@@ -193,6 +199,18 @@ impl Algebra for Builder {
         let node = Node::Mul(first, second);
         let product = self.graph.borrow_mut().intern(node);
         sign(product)
+    }
+}
+
+impl Inverses for Builder {
+    fn inverse(&self, a: &Expr) -> Option<Expr> {
+        Some(self.div(Expr::ONE, *a))
+    }
+}
+
+impl Roots for Builder {
+    fn root(&self, a: &Expr) -> Option<Expr> {
+        Some(self.sqrt(*a))
     }
 }
 

@@ -9,6 +9,7 @@ const FUSED: usize = 4;
 const PRODUCT: usize = 3;
 const SUM: usize = 2;
 const QUOTIENT: usize = 13;
+const ROOT: usize = 21;
 
 /// The products that are formed within sums. Code that is printed, and bounds of its rounding, read it from
 /// here.
@@ -90,6 +91,7 @@ impl Times {
             Node::Add(..) => SUM,
             Node::Mul(..) => PRODUCT,
             Node::Div(..) => QUOTIENT,
+            Node::Sqrt(_) => ROOT,
             _ => 0,
         };
         let cycles: Vec<usize> = nodes.iter().zip(graph.holds()).map(cycles).collect();

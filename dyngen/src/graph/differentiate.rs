@@ -45,6 +45,7 @@ pub fn along(
                 let quotient = b.div(x, y);
                 b.div(b.sub(&of(x), &b.mul(&quotient, &of(y))), y)
             }
+            Node::Sqrt(x) => b.div(of(x), twice_root(b, x)),
         };
         rates.insert(node, rate);
     }
@@ -86,6 +87,7 @@ pub fn gradient(b: &Builder, output: Expr, joints: usize) -> [Vec<Expr>; 2] {
                 give(x, by_x);
                 give(y, -b.mul(&by_x, &b.div(x, y)));
             }
+            Node::Sqrt(x) => give(x, b.div(weight, twice_root(b, x))),
         }
     }
     if output.is_negative() {
@@ -97,6 +99,12 @@ pub fn gradient(b: &Builder, output: Expr, joints: usize) -> [Vec<Expr>; 2] {
 fn signed(rates: &HashMap<usize, Expr>, e: Expr) -> Expr {
     let rate = rates.get(&e.node()).copied().unwrap_or(Expr::ZERO);
     if e.is_negative() { -rate } else { rate }
+}
+
+/// 2√x
+fn twice_root(b: &Builder, x: Expr) -> Expr {
+    let root = b.sqrt(x);
+    b.add(&root, &root)
 }
 
 /// The rate of a sum of angles.

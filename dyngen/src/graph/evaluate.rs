@@ -14,6 +14,8 @@ pub trait Field: Copy {
     fn mul(self, other: Self) -> Self;
     /// a/b; `None` where it is not defined.
     fn div(self, other: Self) -> Option<Self>;
+    /// √a, always the same one of the two roots; `None` where there is none.
+    fn sqrt(self) -> Option<Self>;
     /// A constant; `None` where the field has no such number.
     fn constant(value: &Rational) -> Option<Self>;
 }
@@ -30,6 +32,9 @@ impl Field for Fp {
     }
     fn div(self, other: Self) -> Option<Self> {
         Some(self * other.inverse()?)
+    }
+    fn sqrt(self) -> Option<Self> {
+        self.square_root()
     }
     fn constant(value: &Rational) -> Option<Self> {
         Fp::from_rational(value)
@@ -71,6 +76,7 @@ pub fn nodes<F: Field>(
             Node::Add(a, b) => Some(of(&values, a)?.add(of(&values, b)?)),
             Node::Mul(a, b) => Some(of(&values, a)?.mul(of(&values, b)?)),
             Node::Div(a, b) => of(&values, a)?.div(of(&values, b)?),
+            Node::Sqrt(a) => of(&values, a)?.sqrt(),
         };
         values[node]?;
     }

@@ -117,7 +117,8 @@ impl fmt::Display for Input {
     }
 }
 
-/// An operation. Operands of `Mul` carry no sign, the first of `Add` and both of `Div` neither.
+/// An operation. Operands of `Mul` carry no sign, the first of `Add` and both of `Div` neither; that of
+/// `Sqrt` may.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Node {
     /// A constant other than zero and without sign: index for [`Graph::constant`].
@@ -132,6 +133,8 @@ pub enum Node {
     Mul(Expr, Expr),
     /// a/b
     Div(Expr, Expr),
+    /// √a
+    Sqrt(Expr),
 }
 
 /// Expressions with their nodes in an order in which operands come first.
@@ -152,6 +155,8 @@ pub struct Operations {
     pub add: usize,
     /// Divisions.
     pub div: usize,
+    /// Square roots.
+    pub sqrt: usize,
     /// Angles whose sine and cosine are needed.
     pub sin_cos: usize,
 }
@@ -219,6 +224,7 @@ impl Graph {
                 Node::Add(..) => count.add += 1,
                 Node::Mul(..) => count.mul += 1,
                 Node::Div(..) => count.div += 1,
+                Node::Sqrt(_) => count.sqrt += 1,
                 Node::Input(Input::Sin(sum) | Input::Cos(sum)) => {
                     angles.insert(sum);
                 }
@@ -245,6 +251,7 @@ pub struct Holds {
 pub fn operands(node: &Node) -> impl Iterator<Item = Expr> {
     match *node {
         Node::Add(a, b) | Node::Mul(a, b) | Node::Div(a, b) => [Some(a), Some(b)],
+        Node::Sqrt(a) => [Some(a), None],
         _ => [None, None],
     }
     .into_iter()

@@ -18,6 +18,7 @@ enum Instruction {
     Sub { to: u32, a: u32, b: u32 },
     Mul { to: u32, a: u32, b: u32 },
     Div { to: u32, a: u32, b: u32 },
+    Sqrt { to: u32, a: u32, negative: bool },
 }
 
 /// The place of a result.
@@ -74,8 +75,10 @@ impl Tape {
         let mut free: Vec<u32> = Vec::new();
         let mut instructions = Vec::new();
         for node in &needed {
-            let (Node::Add(a, b) | Node::Mul(a, b) | Node::Div(a, b)) = graph.nodes()[*node] else {
-                continue;
+            let (a, b) = match graph.nodes()[*node] {
+                Node::Add(a, b) | Node::Mul(a, b) | Node::Div(a, b) => (a, b),
+                Node::Sqrt(a) => (a, a),
+                Node::Constant(_) | Node::Symbol(..) | Node::Input(_) => continue,
             };
             let (from_a, from_b) = (slot_of[a.node()], slot_of[b.node()]);
             for operand in [a.node(), b.node()] {
@@ -93,6 +96,7 @@ impl Tape {
             instructions.push(match graph.nodes()[*node] {
                 Node::Mul(..) => Instruction::Mul { to, a, b },
                 Node::Div(..) => Instruction::Div { to, a, b },
+                Node::Sqrt(_) => Instruction::Sqrt { to, a, negative: b_negative },
                 _ if b_negative => Instruction::Sub { to, a, b },
                 _ => Instruction::Add { to, a, b },
             });
@@ -132,6 +136,9 @@ impl Tape {
                 Instruction::Sub { to, a, b } => apply(workspace, to, a, b, |x, y| x - y),
                 Instruction::Mul { to, a, b } => apply(workspace, to, a, b, |x, y| x * y),
                 Instruction::Div { to, a, b } => apply(workspace, to, a, b, |x, y| x / y),
+                Instruction::Sqrt { to, a, negative } => {
+                    apply(workspace, to, a, a, |x, _| if negative { (-x).sqrt() } else { x.sqrt() });
+                }
             }
         }
         for (i, result) in self.outputs.iter().enumerate() {

@@ -1,11 +1,11 @@
-//! Loops that a MuJoCo model closes by `<connect>`: parallelograms on the chain become `[[loop]]`, with the
-//! bodies of their bars.
+//! Loops that a MuJoCo model closes by `<connect>`: loops of four bars on one joint of the chain and
+//! parallelograms on two become `[[loop]]`, with the bodies of their bars.
 
 use super::chain::{ChainJoint, Mass, held, masses};
 use super::pose::Pose;
 use super::tree::Tree;
 use super::urdf::{Connect, Mimic};
-use crate::arm::Bar;
+use crate::arm::{Bar, Linkage};
 use crate::exact::rational;
 use nalgebra::Vector3;
 
@@ -14,7 +14,7 @@ const SAME: f64 = 1e-6;
 /// The joints of a loop.
 const CORNERS: usize = 4;
 
-/// A parallelogram on the chain, at q = 0 in the root link's frame.
+/// A loop of four bars on the chain, at q = 0 in the root link's frame.
 pub(crate) struct ChainLoop {
     /// The loop's first and last joint of the chain.
     pub(crate) first: usize,
@@ -26,6 +26,9 @@ pub(crate) struct ChainLoop {
     /// From the last joint of the chain to the first pin, and from the first joint to the last pin.
     pub(crate) outer: Vector3<f64>,
     pub(crate) inner: Vector3<f64>,
+    /// Of a loop that is no parallelogram, whether its middle pin is on the left of the way from the first to
+    /// the last about the joint's axis.
+    pub(crate) left: Option<bool>,
     /// The loop's bars that are no links of the chain, in the order of the pins between them.
     pub(crate) bars: Vec<ChainBar>,
 }
@@ -38,6 +41,8 @@ pub(crate) struct ChainBar {
     /// The links that move as one, with the frame of each of them.
     pub(crate) links: Vec<String>,
     pub(crate) poses: Vec<Pose>,
+    /// Of a loop that is no parallelogram the bar's axes x and z: along it, and along the joint's axis.
+    pub(crate) axes: Option<[Vector3<f64>; 2]>,
     pub(crate) masses: Vec<Mass>,
 }
 
@@ -46,7 +51,11 @@ impl ChainBar {
     pub(crate) fn frame(&self, in_arm: &Bar, base: &Pose, links: &[Pose]) -> Pose {
         let frame = |link: Option<usize>| link.map_or(base, |link| &links[link]);
         let pin = Vector3::from(in_arm.pin.each_ref().map(rational::to_f64));
-        Pose { rotation: frame(in_arm.parallel).rotation, origin: frame(in_arm.carrier).point(pin) }
+        let origin = frame(in_arm.carrier).point(pin);
+        match self.axes {
+            None => Pose { rotation: frame(in_arm.parallel).rotation, origin },
+            Some([x, z]) => Pose::from_axes(z, x, origin),
+        }
     }
 }
 
@@ -110,10 +119,24 @@ pub(super) fn close(
     let own = if first == last { vec![first_joint.point] } else { vec![first_joint.point, last_joint.point] };
     let corners: Vec<Vector3<f64>> = own.into_iter().chain(pins.iter().map(|pin| pin.point)).collect();
     let directions = pins.iter().filter_map(|pin| pin.direction).chain([last_joint.direction]);
-    let sides = parallelogram(&corners, first_joint.direction, directions)?;
-    // The first bar's frame is at the first pin, that of a second one at the last pin.
-    let at = [0, pins.len() - 1].map(|k| pins[k].point);
-    let bar = |(node, pin): (&Option<usize>, Vector3<f64>)| seen.bar(*node, pin);
+    let sides = sides(&corners, first_joint.direction, directions)?;
+    let left = match (sides[0] + sides[2]).norm() > SAME {
+        false => None,
+        true if first != last => {
+            return Err(
+                "with two joints of the chain only loops whose opposite bars are equal and parallel \
+                        are supported"
+                    .to_string(),
+            );
+        }
+        true => Some(middle_pin(&sides, first_joint)?),
+    };
+    let bar = |(k, node): (usize, &Option<usize>)| {
+        // To the middle pin, from either side.
+        let axes = left.map(|_| [[sides[1], -sides[2]][k].normalize(), first_joint.direction]);
+        // The first bar's frame is at the first pin, that of a second one at the last pin.
+        seen.bar(*node, pins[[0, pins.len() - 1][k]].point, axes)
+    };
     let mut notes = Vec::new();
     for joint in of_bars.iter().map(|j| &tree.robot.joints[*j]) {
         if joint.motor.is_some_and(|motor| motor.armature != 0.0) {
@@ -123,10 +146,11 @@ pub(super) fn close(
     let found = ChainLoop {
         first,
         last,
-        lengths: std::array::from_fn(|k| sides[k % 2].norm()),
+        lengths: std::array::from_fn(|k| sides[if left.is_some() { k } else { k % 2 }].norm()),
+        left,
         outer: sides[last - first],
         inner: -sides[CORNERS - 1],
-        bars: bars.iter().zip(at).map(bar).collect(),
+        bars: bars.iter().enumerate().map(bar).collect(),
         pins: pins.into_iter().map(|pin| pin.name).collect(),
     };
     if first != last {
@@ -155,8 +179,8 @@ fn in_order(
     (open.is_empty() && at == inner).then_some((pins, bars))
 }
 
-/// The sides of a parallelogram from corner to corner, in its plane, m; or why it is none.
-fn parallelogram(
+/// The sides of a loop from corner to corner, in its plane, m; or why it has none.
+fn sides(
     corners: &[Vector3<f64>],
     normal: Vector3<f64>,
     mut directions: impl Iterator<Item = Vector3<f64>>,
@@ -167,13 +191,40 @@ fn parallelogram(
     let flat = |v: Vector3<f64>| v - normal * normal.dot(&v);
     let sides: [Vector3<f64>; CORNERS] =
         std::array::from_fn(|k| flat(corners[(k + 1) % CORNERS] - corners[k]));
-    if (sides[0] + sides[2]).norm() > SAME {
-        return Err("only loops whose opposite bars are equal and parallel are supported".to_string());
-    }
-    if sides[..2].iter().any(|side| side.norm() < SAME) {
+    if sides.iter().any(|side| side.norm() < SAME) {
         return Err("two of its hinges are at one place".to_string());
     }
     Ok(sides)
+}
+
+/// Whether the middle pin of a loop that is no parallelogram is on the left, or why an arm file has no such
+/// loop.
+fn middle_pin(sides: &[Vector3<f64>; CORNERS], joint: &ChainJoint) -> Result<bool, String> {
+    let [first, rod, rocker, last] = sides.each_ref().map(|side| side.norm());
+    let same = |a: f64, b: f64| (a - b).abs() < SAME;
+    if same(first, rocker) && same(rod, last) || same(first, rod) && same(rocker, last) {
+        return Err("its bars are two pairs of equal ones, and it is no parallelogram".to_string());
+    }
+    let (x, y) = (sides[0] / first, joint.direction.cross(&sides[0]) / first);
+    let exact = |v: f64| rational::from_f64(v).unwrap_or_default();
+    let in_plane = |v: Vector3<f64>| [v.dot(&x), v.dot(&y)].map(exact);
+    let left = (sides[1] + sides[2]).cross(&sides[1]).dot(&joint.direction) > 0.0;
+    let linkage = Linkage {
+        joint: 0,
+        outer: in_plane(sides[0]),
+        inner: in_plane(-sides[CORNERS - 1]),
+        rod: exact(rod),
+        rocker: exact(rocker),
+        left,
+    };
+    match linkage.open_within(joint.position, 0.0) {
+        None => Ok(left),
+        Some(closes) => Err(format!(
+            "it closes only where q of joint '{}' is {closes}: give it a range within, away from these dead \
+             points",
+            joint.name
+        )),
+    }
 }
 
 /// The tree at q = 0.
@@ -223,12 +274,13 @@ impl Seen<'_, '_> {
     }
 
     /// A bar behind a joint, whose frame is at a pin.
-    fn bar(&self, joint: Option<usize>, pin: Vector3<f64>) -> ChainBar {
+    fn bar(&self, joint: Option<usize>, pin: Vector3<f64>, axes: Option<[Vector3<f64>; 2]>) -> ChainBar {
         let links: Vec<usize> = self.rigid(joint).collect();
         let masses = |link: &usize| masses(&self.tree.robot.links[*link], &self.pose(*link), self.tolerance);
         ChainBar {
             name: self.name(joint),
             pin,
+            axes,
             links: links.iter().map(|link| self.tree.robot.links[*link].name.clone()).collect(),
             poses: links.iter().map(|link| self.pose(*link)).collect(),
             masses: links.iter().filter_map(masses).collect(),

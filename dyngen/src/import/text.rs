@@ -138,11 +138,14 @@ fn loop_table(text: &mut String, closed: &ChainLoop, chain: &Chain, frames: &Fra
         closed.bars.iter().map(|bar| format!("{{ name = \"{}\" }}", quoted(&bar.name))).collect();
     let _ = write!(
         text,
-        "\n[[loop]]\njoints = [{}]\nlengths = [{}]\nouter = {}\ninner = {}\nbar = [{}]\n",
+        "\n[[loop]]\njoints = [{}]\nlengths = [{}]\nouter = {}\ninner = {}\n{}bar = [{}]\n",
         joints.join(", "),
         lengths.join(", "),
         angle(outer, tolerance),
         angle(inner.sin().atan2(inner.cos()), tolerance),
+        closed.left.map_or(String::new(), |left| {
+            format!("middle = \"{}\"\n", if left { "left" } else { "right" })
+        }),
         bars.join(", ")
     );
 }

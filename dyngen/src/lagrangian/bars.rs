@@ -1,6 +1,8 @@
-//! Bars of closed loops in any algebra: their motion follows from those of two links.
+//! Bars of closed loops in any algebra: their motion follows from those of two links, or from that of one
+//! link and their own turn on it.
 
 use super::elements::{ArmElements, turn_x, turn_z};
+use super::linkage::BarTurn;
 use super::{Motion, link_columns};
 use crate::arm::{Bar, Convention};
 use crate::exact::algebra::Algebra;
@@ -15,14 +17,29 @@ pub struct BarElements<V> {
     pub pin: [V; 3],
     /// The link that it turns with; `None` is the base.
     pub parallel: Option<usize>,
+    /// How it turns on that link, where it does.
+    pub hinge: Option<HingeElements<V>>,
+}
+
+/// A bar's own turn on the link that carries its pin.
+#[derive(Clone, Debug)]
+pub struct HingeElements<V> {
+    /// The joint that turns it.
+    pub joint: usize,
+    /// Whether the bar is the rocker, which is on the link before the joint.
+    pub rocker: bool,
+    /// Sine and cosine of the turn about x from the link's axes to those whose z is the joint's axis.
+    pub tilt: (V, V),
+    /// The turn about z from there to the bar's axes.
+    pub turn: BarTurn<V>,
 }
 
 impl<V: Clone> BarElements<V> {
-    /// A bar's quantities; `exact` gives a number of the arm.
+    /// A bar's quantities without its hinge; `exact` gives a number of the arm.
     pub fn build<A: Algebra<Value = V>>(alg: &A, bar: &Bar, exact: &mut dyn FnMut(&Rational) -> V) -> Self {
         let mut length = |x: &Rational| if *x == Rational::ZERO { alg.integer(0) } else { exact(x) };
         let pin = bar.pin.each_ref().map(&mut length);
-        BarElements { carrier: bar.carrier, pin, parallel: bar.parallel }
+        BarElements { carrier: bar.carrier, pin, parallel: bar.parallel, hinge: None }
     }
 
     /// The motion of the bar's frame, where the links' frames move as `links` and frame 0 as `base`.
@@ -33,12 +50,36 @@ impl<V: Clone> BarElements<V> {
         base: &Motion<V>,
         links: &[Motion<V>],
     ) -> Motion<V> {
+        let mut motion = self.motion_at_pin(alg, arm, base, links);
+        if let Some(HingeElements { tilt: (s, c), turn, .. }) = &self.hinge {
+            for v in [&mut motion.omega, &mut motion.velocity, &mut motion.gravity] {
+                *v = turn_z(alg, &turn.sin, &turn.cos, &turn_x(alg, s, c, v));
+            }
+        }
+        motion
+    }
+
+    /// The motion of the bar in the axes of the link that it turns with, or turns on, about its pin.
+    pub fn motion_at_pin<A: Algebra<Value = V>>(
+        &self,
+        alg: &A,
+        arm: &ArmElements<V>,
+        base: &Motion<V>,
+        links: &[Motion<V>],
+    ) -> Motion<V> {
         let of = |link: Option<usize>| link.map_or(base, |link| &links[link]);
         let (carrier, parallel) = (of(self.carrier), of(self.parallel));
         let turning = alg.cross(&carrier.omega, &self.pin);
         let velocity = std::array::from_fn(|i| alg.add(&carrier.velocity[i], &turning[i]));
+        let mut omega = parallel.omega.clone();
+        if let Some(HingeElements { joint, tilt: (s, c), turn, .. }) = &self.hinge {
+            let rate = alg.mul(&turn.rate, &arm.joints[*joint].velocity);
+            // The joint's axis in the link's axes.
+            omega[1] = alg.sub(&omega[1], &alg.mul(s, &rate));
+            omega[2] = alg.add(&omega[2], &alg.mul(c, &rate));
+        }
         Motion {
-            omega: parallel.omega.clone(),
+            omega,
             velocity: turned(alg, arm, &velocity, self.carrier, self.parallel),
             gravity: parallel.gravity.clone(),
             height: alg.add(&carrier.height, &alg.dot(&carrier.gravity, &self.pin)),

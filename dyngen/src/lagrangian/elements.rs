@@ -1,7 +1,8 @@
 //! The quantities of an arm's kinematics as elements of an algebra.
 
-use super::bars::BarElements;
-use crate::arm::{Angle, Arm, Convention, JointKind, Placement};
+use super::bars::{BarElements, HingeElements};
+use super::linkage::BarTurns;
+use crate::arm::{Angle, Arm, Bar, Convention, JointKind, Linkage, Placement};
 use crate::exact::algebra::Algebra;
 use crate::exact::rational::Rational;
 use crate::exact::symbols::{AngleSymbols, Trig};
@@ -139,6 +140,8 @@ pub trait Source<V> {
     /// A number of the arm that is none of its sizes: an entry of a transmission's matrix, a coordinate of
     /// the pin of a bar.
     fn exact(&mut self, value: &Rational) -> V;
+    /// How rod and rocker of a linkage turn; `None` where the algebra has no roots, or none at this pose.
+    fn linkage(&mut self, linkage: &Linkage) -> Option<BarTurns<V>>;
     /// Component of gravity; requested only if it is not zero.
     fn gravity(&mut self, axis: usize) -> V;
     /// Sine or cosine of an angle symbol.
@@ -197,10 +200,37 @@ impl<V: Clone> ArmElements<V> {
         let gravity = std::array::from_fn(|axis| {
             if arm.gravity[axis].is_zero() { algebra.integer(0) } else { source.gravity(axis) }
         });
-        let bar = |bar| BarElements::build(algebra, bar, &mut |x| source.exact(x));
+        // Of each linkage once: its bars share a root.
+        let turns: Vec<(usize, Option<BarTurns<V>>)> =
+            arm.linkages().map(|linkage| (linkage.joint, source.linkage(linkage))).collect();
+        let bar = |bar: &Bar| BarElements {
+            hinge: hinge(algebra, arm.convention, &joints, bar, &turns),
+            ..BarElements::build(algebra, bar, &mut |x| source.exact(x))
+        };
         let bars = arm.bars.iter().map(bar).collect();
         ArmElements { convention: arm.convention, gravity, joints, bars }
     }
+}
+
+/// A bar's own turn. Where its linkage has none the bar does not turn with anything, which no proof passes.
+fn hinge<A: Algebra>(
+    algebra: &A,
+    convention: Convention,
+    joints: &[JointElements<A::Value>],
+    bar: &Bar,
+    turns: &[(usize, Option<BarTurns<A::Value>>)],
+) -> Option<HingeElements<A::Value>> {
+    let hinge = bar.hinge.as_ref()?;
+    let (joint, rocker) = (hinge.linkage.joint, hinge.rocker);
+    let (sin, cos) = (&joints[joint].sin_alpha, &joints[joint].cos_alpha);
+    // The twist is between the joint's axis and the link before it, or the one behind it.
+    let tilt = match (convention, rocker) {
+        (Convention::Modified, true) => (sin.clone(), cos.clone()),
+        (Convention::Standard, false) => (algebra.neg(sin), cos.clone()),
+        _ => (algebra.integer(0), algebra.integer(1)),
+    };
+    let of_linkage = turns.iter().find(|(of, _)| *of == joint)?.1.as_ref()?;
+    Some(HingeElements { joint, rocker, tilt, turn: of_linkage[usize::from(rocker)].clone() })
 }
 
 /// Rx(α)ᵀ·v: a vector's components after the frame turned by α about x.

@@ -1,8 +1,10 @@
 //! Angles of joints that follow others, in any algebra: multiples of an angle by the addition theorem.
 
-use crate::arm::{Angle, Arm, JointKind};
+use super::linkage::square;
+use crate::arm::{Angle, Arm, JointKind, Linkage};
 use crate::exact::algebra::Algebra;
 use crate::exact::angle::circle_point_near;
+use crate::exact::prime::{Fp, PrimeField};
 use crate::exact::rational::{self, Rational};
 use dashu_int::IBig;
 use num_traits::{One, Signed};
@@ -61,6 +63,36 @@ pub fn input_angles<A: Algebra>(
     angles.into_iter().map(|angle| angle.unwrap_or_else(zero)).collect()
 }
 
+/// Poses that are tried until one is found at which all loops close.
+const TRIES: i64 = 1 << 12;
+
+/// Sines and cosines of [`input_angles`] modulo the prime, at which every linkage of the arm closes: the
+/// number of which it takes a root is a square. `circle` gives a point for an attempt.
+pub fn closing_angles(
+    arm: &Arm,
+    number: &dyn Fn(&Rational) -> Fp,
+    circle: &mut dyn FnMut(i64) -> (Fp, Fp),
+) -> Vec<(Fp, Fp)> {
+    let mut angles = Vec::new();
+    for attempt in 0..TRIES {
+        angles = input_angles(&PrimeField, arm, number, &mut || circle(attempt), None);
+        let closes = |linkage: &Linkage| {
+            let turn = with_theta(&PrimeField, &arm.joints[linkage.joint].theta, angles[linkage.joint]);
+            let [distance, square] = square(&PrimeField, linkage, number, &turn);
+            distance != Fp::ZERO && square != Fp::ZERO && square.square_root().is_some()
+        };
+        if arm.linkages().all(closes) {
+            break;
+        }
+    }
+    angles
+}
+
+/// As [`closing_angles`], the same for every coordinate: zero, where loops close there.
+pub fn still_angles(arm: &Arm, number: &dyn Fn(&Rational) -> Fp) -> Vec<(Fp, Fp)> {
+    closing_angles(arm, number, &mut |attempt| Fp::from_integer(attempt).circle_point())
+}
+
 /// Sine and cosine of an angle and quarter turns, 0 to 3, from those of the angle.
 pub fn quarter_turned<A: Algebra>(alg: &A, turns: u8, (s, c): (A::Value, A::Value)) -> (A::Value, A::Value) {
     match turns {
@@ -106,7 +138,7 @@ fn multiple_of<A: Algebra>(alg: &A, count: &IBig, angle: &(A::Value, A::Value)) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::exact::prime::{Draws, Fp, PrimeField};
+    use crate::exact::prime::Draws;
 
     #[test]
     fn multiples_of_an_angle_are_sums_of_it() {

@@ -4,6 +4,7 @@
 pub mod bars;
 pub mod elements;
 pub mod followers;
+pub mod linkage;
 
 use crate::arm::{Convention, JointKind, ParameterKind};
 use crate::exact::algebra::Algebra;

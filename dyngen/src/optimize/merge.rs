@@ -64,7 +64,14 @@ fn fingerprint(
         Node::Add(x, y) => pair(x, y, |a, b| Some(a + b)),
         Node::Mul(x, y) => pair(x, y, |a, b| Some(a * b)),
         Node::Div(x, y) => pair(x, y, |a, b| a.div(b)),
+        Node::Sqrt(x) => Some(of(x)?.map(root)),
     }
+}
+
+/// The root of a square. The number of no square has a value for its root that is as good as free of all
+/// others, so that no two nodes agree because of it.
+fn root(x: Fp) -> Fp {
+    x.square_root().unwrap_or_else(|| Draws::new(x.residue()).element())
 }
 
 /// Random values of inputs, sines and cosines on the circle.

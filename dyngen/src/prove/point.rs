@@ -9,7 +9,7 @@ use crate::exact::rational::Rational;
 use crate::exact::symbols::AngleSymbols;
 use crate::graph::evaluate::sine_and_cosine;
 use crate::graph::{Expr, Input, evaluate};
-use crate::lagrangian::followers::{input_angles, with_theta};
+use crate::lagrangian::followers::{closing_angles, still_angles, with_theta};
 use crate::parameters::{Combination, ParameterSet};
 
 /// A pose, rates and parameter values.
@@ -63,14 +63,9 @@ fn residue(x: &Rational) -> Fp {
     Fp::from_rational(x).unwrap_or(Fp::ZERO)
 }
 
-/// Sine and cosine of each joint's trigonometric input, for points of the circle.
-fn angles(arm: &Arm, circle: &mut dyn FnMut() -> (Fp, Fp)) -> Vec<(Fp, Fp)> {
-    input_angles(&PrimeField, arm, &residue, circle, None)
-}
-
 impl<'a> Point<'a> {
     pub(crate) fn draw(arm: &'a Arm, symbols: &'a AngleSymbols, sets: &'a Sets, draws: &mut Draws) -> Self {
-        let angles = angles(arm, &mut || draws.element().circle_point());
+        let angles = closing_angles(arm, &residue, &mut |_| draws.element().circle_point());
         let positions = (0..arm.dof()).map(|_| draws.element()).collect();
         let values = arm.kept_parameters().into_iter().map(|p| (p, draws.element())).collect();
         let mut vector = || (0..arm.dof()).map(|_| draws.element()).collect::<Vec<_>>();
@@ -95,10 +90,11 @@ impl<'a> Point<'a> {
         }
     }
 
-    /// The values of this point at the pose where every coordinate's input angle is zero.
+    /// The values of this point at the pose where every coordinate's input angle is zero, or another one
+    /// where loops do not close there.
     pub(crate) fn at_zero(&self) -> Point<'a> {
         Point {
-            angles: angles(self.arm, &mut || (Fp::ZERO, Fp::ONE)),
+            angles: still_angles(self.arm, &residue),
             positions: vec![Fp::ZERO; self.positions.len()],
             ..self.clone()
         }

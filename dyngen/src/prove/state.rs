@@ -4,6 +4,7 @@
 use super::half;
 use super::point::{Motion, Point};
 use super::varied::{MIXED, OverPrime, Varied, mixed};
+use crate::arm::Linkage;
 use crate::exact::algebra::Algebra;
 use crate::exact::dual::Duals;
 use crate::exact::jet::{Jet, Jets};
@@ -11,6 +12,7 @@ use crate::exact::prime::{Fp, PrimeField};
 use crate::exact::rational::Rational;
 use crate::graph::differentiate::Direction;
 use crate::lagrangian::elements::{ArmElements, PlacementElements, Source};
+use crate::lagrangian::linkage::{BarTurns, turns};
 use crate::lagrangian::{self, twice_lagrangian};
 
 /// A motion of the arm at a point's pose.
@@ -152,7 +154,7 @@ impl<A: OverPrime> JetSource<'_, '_, A> {
     }
 }
 
-impl<A: OverPrime> Source<Jet<A::Value>> for JetSource<'_, '_, A> {
+impl<A: OverPrime + Copy> Source<Jet<A::Value>> for JetSource<'_, '_, A> {
     fn joint_trig(&mut self, joint: usize) -> (Jet<A::Value>, Jet<A::Value>) {
         let (s, c) = self.kinematics.joint_trig(joint);
         let back = self.kinematics.algebra.neg(&s);
@@ -183,6 +185,16 @@ impl<A: OverPrime> Source<Jet<A::Value>> for JetSource<'_, '_, A> {
     }
     fn exact(&mut self, value: &Rational) -> Jet<A::Value> {
         self.jets.constant(self.kinematics.exact(value))
+    }
+    /// A turn's derivative by the joint's position is that along an infinitesimal.
+    fn linkage(&mut self, linkage: &Linkage) -> Option<BarTurns<Jet<A::Value>>> {
+        let kinematics = &mut self.kinematics;
+        let (s, c) = kinematics.joint_trig(linkage.joint);
+        let algebra = kinematics.algebra;
+        let turn = ((s.clone(), c.clone()), (c, algebra.neg(&s)));
+        let number = |x: &Rational| (kinematics.number(x), algebra.integer(0));
+        let turns = turns(&Duals(algebra), linkage, &number, &turn)?;
+        Some(turns.map(|turn| turn.map(|(x, dx)| self.of_position(linkage.joint, x, dx))))
     }
     fn gravity(&mut self, axis: usize) -> Jet<A::Value> {
         match self.gravity {

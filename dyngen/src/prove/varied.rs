@@ -1,14 +1,16 @@
 //! The arm's quantities at a point whose pose is varied: derivatives of any order by infinitesimals.
 
 use super::point::Point;
-use crate::exact::algebra::Algebra;
+use crate::arm::Linkage;
+use crate::exact::algebra::{Algebra, Roots};
 use crate::exact::dual::Duals;
 use crate::exact::prime::{Fp, PrimeField};
 use crate::exact::rational::Rational;
 use crate::lagrangian::elements::{PlacementElements, Source};
+use crate::lagrangian::linkage::{BarTurns, turns};
 
 /// An algebra that has the prime field's elements among its own.
-pub(super) trait OverPrime: Algebra {
+pub(super) trait OverPrime: Roots {
     /// An element of the field.
     fn element(&self, x: Fp) -> Self::Value;
 }
@@ -103,6 +105,10 @@ impl<A: OverPrime> Source<A::Value> for Varied<'_, '_, A> {
     }
     fn exact(&mut self, value: &Rational) -> A::Value {
         self.number(value)
+    }
+    fn linkage(&mut self, linkage: &Linkage) -> Option<BarTurns<A::Value>> {
+        let turn = self.joint_trig(linkage.joint);
+        turns(&self.algebra, linkage, &|x| self.number(x), &turn)
     }
     fn gravity(&mut self, axis: usize) -> A::Value {
         self.number(&self.point.arm.gravity[axis])

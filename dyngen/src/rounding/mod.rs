@@ -125,6 +125,9 @@ impl<'a> Bounder<'a> {
         if let Some(missing) = limits.missing(built.arguments()) {
             return Err(missing);
         }
+        if built.graph.operations(&built.outputs).sqrt > 0 {
+            return Err("the square root that its loop needs has no bound".to_string());
+        }
         let divisor = divisor(built.function);
         let task = match divisor {
             Some(Divisor::Task) => Some(self.task(&limits)?),

@@ -78,6 +78,8 @@ impl Emitted {
                 Node::Add(a, b) => Operation::Add(at(a), at(b), b.is_negative()),
                 Node::Mul(a, b) => Operation::Mul(at(a), at(b)),
                 Node::Div(a, b) => Operation::Div(at(a), at(b)),
+                // Of loops that are no parallelograms; no bounds are asked for.
+                Node::Sqrt(_) => return None,
             };
             emitted.operations.push(operation);
         }

@@ -156,9 +156,10 @@ impl Circle {
         Circle { constants: constants.clone(), of_constants, coordinates, phases }
     }
 
-    /// This one where every coordinate with its theta is zero.
-    pub(crate) fn at_zero(&self) -> Circle {
-        let still = |unit: &Unit| Unit { sine_and_cosine: (Fp::ZERO, Fp::ONE), ..unit.clone() };
+    /// This one where every coordinate with its theta has one angle: zero for `k` zero.
+    pub(crate) fn at(&self, k: i64) -> Circle {
+        let sine_and_cosine = Fp::from_integer(k).circle_point();
+        let still = |unit: &Unit| Unit { sine_and_cosine, ..unit.clone() };
         Circle { coordinates: self.coordinates.iter().map(still).collect(), ..self.clone() }
     }
 

@@ -58,6 +58,37 @@ impl Dual {
     }
 }
 
+impl Dual {
+    /// Σ (coefficient of a power)·(change from the finite part, as a share of it)ᵏ, times a number. `None`
+    /// where the finite part is zero.
+    fn series(&self, scale: Fp, coefficient: impl Fn(i64) -> Fp) -> Option<Dual> {
+        let finite = self.at(0);
+        let change = (self - &Dual::number(finite)).times(finite.inverse()?);
+        let (mut power, mut sum, mut factor) = (Dual::number(Fp::ONE), Dual(vec![]), scale);
+        // A power beyond the number of infinitesimals is zero.
+        for k in 0..=self.0.len().trailing_zeros() as i64 {
+            sum = &sum + &power.times(factor);
+            power = &power * &change;
+            factor = factor * coefficient(k);
+        }
+        Some(sum)
+    }
+
+    /// 1/x; `None` where the finite part is zero.
+    pub(crate) fn inverse(&self) -> Option<Dual> {
+        self.series(self.at(0).inverse()?, |_| -Fp::ONE)
+    }
+
+    /// √x, whose finite part is a square itself; `None` where that of x is none.
+    pub(crate) fn root(&self) -> Option<Dual> {
+        let root = self.at(0).square_root()?;
+        // Newton's series: the next coefficient is the last one times (1/2 − k)/(k + 1).
+        let next =
+            |k: i64| Fp::from_integer(1 - 2 * k) * Fp::from_integer(2 * k + 2).inverse().unwrap_or(Fp::ZERO);
+        self.series(root, next)
+    }
+}
+
 impl std::ops::Add for &Dual {
     type Output = Dual;
     fn add(self, other: &Dual) -> Dual {
@@ -89,6 +120,20 @@ impl std::ops::Mul for &Dual {
 mod tests {
     use super::*;
     use dyngen_arm::exact::prime::Draws;
+
+    #[test]
+    fn inverses_and_roots_undo_products() {
+        let mut draws = Draws::new(2);
+        for _ in 0..4 {
+            let parts = [1, 2, 4, 5, 3, 7].map(|index| Dual::along(index, draws.element()));
+            let root = draws.element();
+            let x = parts.iter().fold(Dual::number(root * root), |sum, part| &sum + part);
+            let one = &x * &x.inverse().unwrap();
+            assert_eq!(&one - &Dual::number(Fp::ONE), &x - &x);
+            let y = x.root().unwrap();
+            assert_eq!(&(&y * &y) - &x, &x - &x);
+        }
+    }
 
     #[test]
     fn sines_obey_the_theorem_of_addition_with_infinitesimals_too() {

@@ -7,7 +7,8 @@
 
 use crate::angles::{Affine, Circle, of_joint, residue};
 use crate::dual::Dual;
-use dyngen_arm::arm::{Arm, Convention, JointKind, Placement};
+use crate::linkage;
+use dyngen_arm::arm::{Arm, Bar, Convention, Hinge, JointKind, Placement};
 use dyngen_arm::exact::prime::Fp;
 use dyngen_arm::exact::rational::Rational;
 
@@ -128,7 +129,10 @@ impl Chain<'_> {
             bodies.push(Body { frame: frame.clone(), rotor });
         }
         let of = |link: Option<usize>| link.map_or(&start, |link| &bodies[link].frame);
-        let bar = |bar: &dyngen_arm::arm::Bar| {
+        let bar = |bar: &Bar| {
+            if let Some(hinge) = &bar.hinge {
+                return Body { frame: self.hinged(of(bar.carrier).clone(), bar, hinge), rotor: None };
+            }
             let (mut pin, mut frame) = (of(bar.carrier).clone(), of(bar.parallel).clone());
             pin.constant_shift(&bar.pin);
             frame.0[ORIGIN] = pin.0[ORIGIN].clone();
@@ -140,6 +144,26 @@ impl Chain<'_> {
         (bodies, tool)
     }
 
+    /// The frame of a bar that turns on a link.
+    fn hinged(&self, mut link: Frame, bar: &Bar, hinge: &Hinge) -> Frame {
+        let joint = hinge.linkage.joint;
+        link.constant_shift(&bar.pin);
+        if let Some(back) = linkage::twist(self.arm.convention, hinge) {
+            let (sine, cosine) = self.circle.of_constant(&self.arm.joints[joint].alpha);
+            link.constant_turn(0, (if back { -sine } else { sine }, cosine));
+        }
+        link.turn(2, &linkage::turn(hinge, &self.turned(joint)));
+        link
+    }
+
+    /// Sine and cosine of the angle of a joint that turns.
+    fn turned(&self, joint: usize) -> (Dual, Dual) {
+        let position = of_joint(self.arm, joint);
+        // `Verifier::new` has seen that every angle of a joint has a sine.
+        let at = self.circle.sine_and_cosine(&position).unwrap_or((Fp::ZERO, Fp::ZERO));
+        self.changed(&position).sine_and_cosine(at)
+    }
+
     /// The joint's own motion: about its axis or along it.
     fn advance(&self, joint: usize, frame: &mut Frame) {
         let row = &self.arm.joints[joint];
@@ -148,9 +172,7 @@ impl Chain<'_> {
         let d = Dual::number(residue(&row.d));
         match row.kind {
             JointKind::Revolute => {
-                // `Verifier::new` has seen that every angle of a joint has a sine.
-                let at = self.circle.sine_and_cosine(&position).unwrap_or((Fp::ZERO, Fp::ZERO));
-                frame.turn(2, &change.sine_and_cosine(at));
+                frame.turn(2, &self.turned(joint));
                 frame.shift(2, &d);
             }
             JointKind::Prismatic => {

@@ -25,6 +25,8 @@ pub(crate) enum Kind {
     Negative(Box<Expr>),
     /// One of + - * /.
     Binary(char, Box<Expr>, Box<Expr>),
+    /// A square root.
+    Root(Box<Expr>),
     List(Vec<Expr>),
     Record(Vec<(String, Expr)>),
     Field(Box<Expr>, String),
@@ -219,6 +221,10 @@ impl World<'_> {
                     None => return stop("a division by zero".to_string()),
                 }
             }
+            Kind::Root(x) => match self.number(x, names, depth)?.value.square_root() {
+                Some(root) => Value::Number(root.into()),
+                None => return stop("a root that none of the arm's loops has".to_string()),
+            },
             Kind::List(items) => Value::list(self.values(items, names, depth)?),
             Kind::Record(fields) => {
                 let field = |(name, e): &'e (String, Expr)| Ok((name.clone(), self.value(e, names, depth)?));

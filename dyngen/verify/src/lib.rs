@@ -11,6 +11,7 @@ mod friction;
 mod functions;
 mod lagrangian;
 mod language;
+mod linkage;
 mod matrix;
 mod point;
 mod read;

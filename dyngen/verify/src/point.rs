@@ -3,6 +3,7 @@
 use crate::angles::Circle;
 use crate::dual::Dual;
 use crate::lagrangian::{Chain, FIRST, SECOND};
+use crate::linkage::close;
 use dyngen_arm::arm::Arm;
 use dyngen_arm::exact::prime::{Draws, Fp};
 use dyngen_arm::exact::symbols::AngleSymbols;
@@ -26,7 +27,7 @@ pub(crate) struct Point<'a> {
 impl<'a> Point<'a> {
     /// A random one; `constants` are the constant angles of the arm with all its frames.
     pub(crate) fn draw(arm: &'a Arm, constants: &AngleSymbols, draws: &mut Draws) -> Point<'a> {
-        let circle = Circle::draw(arm, constants, draws);
+        let circle = closing(arm, |_| Circle::draw(arm, constants, draws));
         let pi = draws.element();
         let n = arm.dof();
         let q = (0..n).map(|_| draws.element()).collect();
@@ -48,9 +49,14 @@ impl<'a> Point<'a> {
         Point { arm, circle, pi, q, vectors, values }
     }
 
-    /// This point where every coordinate with its theta is zero.
+    /// This point where every coordinate with its theta is zero, or where all have another angle if loops do
+    /// not close there.
     pub(crate) fn at_zero(&self) -> Point<'a> {
-        Point { circle: self.circle.at_zero(), q: vec![Fp::ZERO; self.q.len()], ..self.clone() }
+        Point {
+            circle: closing(self.arm, |k| self.circle.at(k)),
+            q: vec![Fp::ZERO; self.q.len()],
+            ..self.clone()
+        }
     }
 
     pub(crate) fn dof(&self) -> usize {
@@ -77,6 +83,21 @@ impl<'a> Point<'a> {
     pub(crate) fn chain(&self, change: Vec<Dual>) -> Chain<'_> {
         Chain { arm: self.arm, circle: &self.circle, q: &self.q, change }
     }
+}
+
+/// Points that are tried until one is found at which all loops close.
+const TRIES: i64 = 1 << 12;
+
+/// The first of some circles at which all loops of an arm close.
+fn closing(arm: &Arm, mut circle: impl FnMut(i64) -> Circle) -> Circle {
+    let mut found = circle(0);
+    for k in 1..TRIES {
+        if close(arm, &found) {
+            break;
+        }
+        found = circle(k);
+    }
+    found
 }
 
 /// A motion: the coordinates along a first and a second direction, with the accelerations of both together.

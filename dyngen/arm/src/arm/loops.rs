@@ -1,21 +1,22 @@
-//! `[[loop]]`: planar loops of four bars, which close on the chain. Those that are parallelograms are known:
-//! their joints of the chain are affine functions of each other, and their other bars are [`Bar`]s.
+//! `[[loop]]`: planar loops of four bars, which close on the chain. Their bars that are no links are
+//! [`Bar`]s. Joints of the chain in one parallelogram are affine functions of each other. In other loops,
+//! which have one joint of the chain, the bars turn as a [`Linkage`] says.
 
 use super::table::{Reader, Table, Value, describe};
-use super::{Angle, Bar, Convention, Joint, JointKind, Mimic, ParameterKind};
+use super::{Angle, Bar, Convention, Hinge, Joint, JointKind, Linkage, Mimic, ParameterKind};
 use crate::exact::rational::{self, Rational, to_f64};
 use num_traits::{Signed, Zero};
 use std::f64::consts::TAU;
 use toml::de::DeValue;
 
-const KEYS: [&str; 5] = ["joints", "lengths", "inner", "outer", "bar"];
+const KEYS: [&str; 6] = ["joints", "lengths", "inner", "outer", "middle", "bar"];
 const BAR_KEYS: [&str; 2] = ["name", "zero"];
 /// The bars of a loop.
 const BARS: usize = 4;
 /// The most loops that an arm may have.
 const MAX_LOOPS: usize = 8;
 /// Lengths and angles that differ by less are the same, m or rad.
-const SAME: f64 = 1e-9;
+pub(super) const SAME: f64 = 1e-9;
 
 /// A loop as the file says it.
 struct Loop {
@@ -30,6 +31,9 @@ struct Loop {
     inner: Angle,
     /// Direction from the last joint of the chain to the first pin, on the link behind it.
     outer: Angle,
+    /// Whether the middle one of three pins is on the left of the way from the first to the last; nothing
+    /// where a parallelogram is meant.
+    left: Option<bool>,
 }
 
 /// Reads the loops of an arm and lets the joints that they tie follow each other.
@@ -60,6 +64,13 @@ pub(super) fn read(
             sound = false;
             continue;
         };
+        let joint = |bar: &Bar| bar.hinge.as_ref().map(|hinge| hinge.linkage.joint);
+        let turned = own.iter().find_map(joint);
+        if turned.is_some() && bars.iter().any(|other: &Bar| joint(other) == turned) {
+            let message = format!("{}: its joint has another loop that is no parallelogram", t.place);
+            reader.errors.error(t.span.clone(), message);
+            sound = false;
+        }
         for bar in own {
             if bars.iter().any(|other: &Bar| other.name == bar.name) {
                 let message = format!(
@@ -87,9 +98,12 @@ fn read_one(
     let mut direction =
         |key: &str| reader.required(t, key).and_then(|v| reader.angle(v, &format!("{place}: {key}")));
     let (inner, outer) = (direction("inner"), direction("outer"));
+    let left = reader.optional(t, "middle", |r, v| side(r, v, place));
     let (first, last, pins) = named?;
-    let found = Loop { first, last, pins, lengths: lengths?, inner: inner?, outer: outer? };
-    let wrong = planar(joints, convention, &found).or_else(|| found.unequal(convention, joints));
+    let found = Loop { first, last, pins, lengths: lengths?, inner: inner?, outer: outer?, left: left? };
+    let wrong = planar(joints, convention, &found)
+        .or_else(|| found.unequal(convention, joints))
+        .or_else(|| found.open(joints));
     if let Some(why) = wrong {
         reader.errors.error(t.span.clone(), format!("{place}: {why}"));
         return None;
@@ -178,6 +192,19 @@ fn lengths(reader: &mut Reader<'_>, v: &Value<'_>, place: &str) -> Option<[Ratio
         reader.errors.error(item.span(), format!("{place}: lengths {message}"));
     }
     sound.then_some(lengths)
+}
+
+/// Whether a loop's middle pin is on the left.
+fn side(reader: &mut Reader<'_>, v: &Value<'_>, place: &str) -> Option<bool> {
+    match v.get_ref().as_str().map(str::trim) {
+        Some("left") => Some(true),
+        Some("right") => Some(false),
+        _ => {
+            let message = format!("{place}: middle must be \"left\" or \"right\", found {}", describe(v));
+            reader.errors.error(v.span(), message);
+            None
+        }
+    }
 }
 
 /// Why the joints of a loop do not turn in one plane.
@@ -272,18 +299,37 @@ impl Loop {
         }
     }
 
-    /// Why its lengths are those of no parallelogram, or not those of the table.
+    /// Why its lengths are those of no loop that can be described, or not those of the table.
     fn unequal(&self, convention: Convention, joints: &[Joint]) -> Option<String> {
         let [first, second, third, fourth] = &self.lengths;
-        if first != third || second != fourth {
+        let equal = first == third && second == fourth;
+        if self.first != self.last && (!equal || self.left.is_some()) {
             return Some(format!(
-                "lengths {}, {}, {}, {} are no parallelogram: only loops whose opposite bars are equal are \
-                 supported (the first and third, the second and fourth length)",
+                "lengths {}, {}, {}, {} are no parallelogram: with two joints of the chain only loops whose \
+                 opposite bars are equal are supported (the first and third, the second and fourth length), \
+                 without middle",
                 to_f64(first),
                 to_f64(second),
                 to_f64(third),
                 to_f64(fourth)
             ));
+        }
+        // Then the number of which a root is taken is a square, and the loop may change its way to close.
+        let two_pairs = equal || first == second && third == fourth;
+        if two_pairs && (self.left.is_some() || !equal) {
+            return Some(
+                "its bars are two pairs of equal ones: of such loops only parallelograms are supported \
+                 (opposite bars are equal, without middle)"
+                    .to_string(),
+            );
+        }
+        if !equal && self.left.is_none() {
+            return Some(
+                "opposite bars are not equal, so the loop closes in two ways: say with middle = \"left\" or \
+                 \"right\" on which side of the way from the first pin to the last the middle pin is (about \
+                 the joint's axis)"
+                    .to_string(),
+            );
         }
         let row = match convention {
             Convention::Modified => &joints[self.last],
@@ -300,6 +346,33 @@ impl Loop {
         })
     }
 
+    /// The linkage of a loop that is no parallelogram.
+    fn linkage(&self) -> Option<Linkage> {
+        let pin =
+            |direction: &Angle, length: &Rational| turned(direction, [length.clone(), Rational::zero()]);
+        let [outer, rod, rocker, inner] = &self.lengths;
+        Some(Linkage {
+            joint: self.first,
+            outer: pin(&self.outer, outer),
+            inner: pin(&self.inner, inner),
+            rod: rod.clone(),
+            rocker: rocker.clone(),
+            left: self.left?,
+        })
+    }
+
+    /// Why a loop that is no parallelogram does not close within the limits of its joint.
+    fn open(&self, joints: &[Joint]) -> Option<String> {
+        let linkage = self.linkage()?;
+        let joint = &joints[self.first];
+        let closes = linkage.open_within(joint.position, joint.theta.radians())?;
+        Some(format!(
+            "it closes only where q of joint {} is {closes}, and at these ends it is at a dead point: give the \
+             joint limits (position) within",
+            self.first + 1
+        ))
+    }
+
     /// The loop's bars that are no links, from the outer link on.
     fn bars(&self, convention: Convention, joints: &[Joint]) -> Vec<Bar> {
         let inner_link = self.first.checked_sub(1);
@@ -307,14 +380,28 @@ impl Loop {
             let at = |k: usize| self.pins.get(k).cloned().unwrap_or_default();
             format!("{}-{}", at(from), at(from + 1))
         };
-        let bar =
-            |name: String, carrier, pin, parallel| Bar { name, carrier, pin, parallel, zero: Vec::new() };
+        let bar = |name: String, carrier, pin, parallel| Bar {
+            name,
+            carrier,
+            pin,
+            parallel,
+            hinge: None,
+            zero: Vec::new(),
+        };
         let outer = self.outer_pin(convention, &joints[self.last]);
         // Its outer pin is on the outer link, and it is parallel to the bar opposite.
         if self.first != self.last {
             return vec![bar(name(0), Some(self.last), outer, Some(self.first))];
         }
         let inner = self.inner_pin(convention, &joints[self.first]);
+        if let Some(linkage) = self.linkage() {
+            let hinged =
+                |bar: Bar, rocker| Bar { hinge: Some(Hinge { linkage: linkage.clone(), rocker }), ..bar };
+            return vec![
+                hinged(bar(name(0), Some(self.last), outer, Some(self.last)), false),
+                hinged(bar(name(1), inner_link, inner, inner_link), true),
+            ];
+        }
         vec![
             bar(name(0), Some(self.last), outer, inner_link),
             bar(name(1), inner_link, inner, Some(self.first)),

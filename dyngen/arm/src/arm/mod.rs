@@ -1,6 +1,7 @@
 //! The arm as its file describes it: kinematics, declared symmetries, rotors, limits.
 
 mod bar;
+mod linkage;
 mod loops;
 mod mimic;
 pub mod parameter;
@@ -14,6 +15,7 @@ use crate::diagnostic::Diagnostics;
 pub use crate::exact::angle::Angle;
 use crate::exact::rational::{self, Rational};
 pub use bar::Bar;
+pub use linkage::{Hinge, Linkage};
 pub use mimic::{Drive, Mimic};
 use nalgebra::{Rotation3, Vector3};
 use num_traits::{One, Zero};

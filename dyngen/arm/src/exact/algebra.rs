@@ -37,3 +37,15 @@ pub trait Algebra {
         [minor(1, 2), minor(2, 0), minor(0, 1)]
     }
 }
+
+/// An algebra with inverses.
+pub trait Inverses: Algebra {
+    /// 1/a; `None` where there is none.
+    fn inverse(&self, a: &Self::Value) -> Option<Self::Value>;
+}
+
+/// An algebra with square roots.
+pub trait Roots: Inverses {
+    /// A square root of a, always the same one of the two; `None` where there is none.
+    fn root(&self, a: &Self::Value) -> Option<Self::Value>;
+}

@@ -3,7 +3,7 @@
 //! A constant is a fraction of polynomials over those symbols. For an arm whose angles are multiples of pi/2
 //! it is a rational number.
 
-use super::algebra::Algebra;
+use super::algebra::{Algebra, Inverses};
 use super::gcd;
 use super::polynomial::{Monomial, Numerator, PolynomialRing, Square};
 use super::prime::{Draws, Fp};
@@ -309,6 +309,12 @@ impl ConstantField {
             text.push_str(&factors.join("*"));
         }
         if text.is_empty() { "0".to_string() } else { text }
+    }
+}
+
+impl Inverses for ConstantField {
+    fn inverse(&self, a: &Constant) -> Option<Constant> {
+        self.div(&self.rational(rational::integer(1)), a)
     }
 }
 

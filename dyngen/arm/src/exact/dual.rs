@@ -1,6 +1,6 @@
 //! First derivatives in one direction over any algebra.
 
-use super::algebra::Algebra;
+use super::algebra::{Algebra, Inverses, Roots};
 
 /// Pairs of a value and its derivative over an algebra.
 #[derive(Clone, Copy, Debug, Default)]
@@ -24,5 +24,21 @@ impl<A: Algebra> Algebra for Duals<A> {
     fn mul(&self, a: &Self::Value, b: &Self::Value) -> Self::Value {
         let cross = self.0.add(&self.0.mul(&a.0, &b.1), &self.0.mul(&a.1, &b.0));
         (self.0.mul(&a.0, &b.0), cross)
+    }
+}
+
+impl<A: Inverses> Inverses for Duals<A> {
+    fn inverse(&self, (x, dx): &Self::Value) -> Option<Self::Value> {
+        let inverse = self.0.inverse(x)?;
+        let slope = self.0.neg(&self.0.mul(&inverse, &inverse));
+        Some((inverse, self.0.mul(&slope, dx)))
+    }
+}
+
+impl<A: Roots> Roots for Duals<A> {
+    fn root(&self, (x, dx): &Self::Value) -> Option<Self::Value> {
+        let root = self.0.root(x)?;
+        let slope = self.0.inverse(&self.0.add(&root, &root))?;
+        Some((root, self.0.mul(&slope, dx)))
     }
 }

@@ -3,7 +3,7 @@
 //! Two different polynomials of degree d agree at a random point with probability at most d/p
 //! (Schwartz–Zippel), so two points already leave less than 2⁻¹⁰⁰ for any formula of an arm.
 
-use super::algebra::Algebra;
+use super::algebra::{Algebra, Inverses, Roots};
 use super::rational::{self, Rational};
 use dashu_int::IBig;
 
@@ -158,6 +158,19 @@ impl Algebra for PrimeField {
     }
     fn mul(&self, a: &Fp, b: &Fp) -> Fp {
         *a * *b
+    }
+}
+
+impl Inverses for PrimeField {
+    fn inverse(&self, a: &Fp) -> Option<Fp> {
+        a.inverse()
+    }
+}
+
+/// The root that is a square itself: of x and −x one is.
+impl Roots for PrimeField {
+    fn root(&self, a: &Fp) -> Option<Fp> {
+        a.square_root()
     }
 }
 

@@ -30,7 +30,7 @@ typedef {}_real real;
         names.upper,
         names.numbers(),
         names.prefix,
-        helpers(&names, model, options).replace("\nstatic ", "\nstatic __device__ "),
+        helpers(&names, model, options, true).replace("\nstatic ", "\nstatic __device__ "),
         items.join("\n")
     ))
 }

@@ -42,7 +42,7 @@ pub fn c_files(model: &Model, options: &Options, header: &str) -> Result<CFiles,
         header: names.header(&head(&[]), &items),
         source: names.source(
             &head(&rounded::lines(model, &parts)),
-            &(condition.to_string() + &helpers(&names, model, options)),
+            &(condition.to_string() + &helpers(&names, model, options, false)),
             header,
             &items,
         ),
@@ -234,17 +234,19 @@ fn documentation(text: &str) -> String {
 }
 
 /// What functions of the source file call.
-fn helpers(names: &Names, model: &Model, options: &Options) -> String {
+fn helpers(names: &Names, model: &Model, options: &Options, is_cuda: bool) -> String {
     let turns = model.arm().joints.iter().any(|joint| joint.kind == JointKind::Revolute);
     let trigonometry = if turns { dyngen_verify::text::TRIGONOMETRY_C } else { "" };
     let friction = friction::helpers(&options.friction);
     let parts = [trigonometry, &friction]
         .map(|text| if text.is_empty() { String::new() } else { format!("{text}\n") });
     let fused = if options.contract { fused::IN_C } else { "" };
-    (fused.to_string() + &parts.concat()).replace("NAME", &names.upper)
+    let has_roots = model.arm().linkages().next().is_some();
+    let root = if has_roots { dyngen_verify::text::root_in_c(is_cuda) } else { String::new() };
+    (fused.to_string() + &root + &parts.concat()).replace("NAME", &names.upper)
 }
 
-const SYNTAX: Syntax = Syntax { value: "const real", field: "->", number, fused: "fused" };
+const SYNTAX: Syntax = Syntax { value: "const real", field: "->", number, fused: "fused", root: "root" };
 
 /// A number: rounded to double, then to the file's numbers, as in Rust.
 fn number(x: f64) -> String {

@@ -15,7 +15,7 @@ use crate::dynamics::function::Argument;
 use crate::graph::Input;
 use crate::model::{Error, Model};
 
-const SYNTAX: Syntax = Syntax { value: "let", field: ".", number, fused: "fma" };
+const SYNTAX: Syntax = Syntax { value: "let", field: ".", number, fused: "fma", root: "sqrt" };
 
 /// A number: its digits are those of the file in Rust.
 fn number(x: f64) -> String {

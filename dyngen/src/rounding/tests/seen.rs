@@ -156,6 +156,7 @@ impl<'a, T: RealField + Copy> Emitted<'a, T> {
                 Node::Add(a, b) => of(a) + of(b),
                 Node::Mul(a, b) => of(a) * of(b),
                 Node::Div(a, b) => of(a) / of(b),
+                Node::Sqrt(a) => of(a).sqrt(),
             };
         }
         let of = |e: &Expr| if e.is_negative() { -self.values[e.node()] } else { self.values[e.node()] };

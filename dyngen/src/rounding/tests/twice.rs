@@ -78,6 +78,11 @@ impl Field for Twice {
         let rest = self.add(other.mul(first).neg());
         Some(first.add(Twice::from(rest.0 / other.0)))
     }
+    fn sqrt(self) -> Option<Self> {
+        let first = Twice::from(self.0.sqrt());
+        let rest = self.add(first.mul(first).neg());
+        Some(first.add(Twice::from(rest.0 / (2.0 * first.0))))
+    }
     fn constant(value: &Rational) -> Option<Self> {
         let high = to_f64(value);
         Some(Twice(high, to_f64(&(value - rational::from_f64(high)?))))

@@ -66,6 +66,8 @@ pub(crate) struct Cursor<'a> {
     pub(crate) place: String,
     /// The function that gives x·y + z; empty where the file has none.
     pub(crate) fused: &'static str,
+    /// The function that gives a square root; empty where the file has none.
+    pub(crate) root: &'static str,
     /// Literals of many digits that the head does not explain, with their lines.
     pub(crate) unexplained: Vec<(usize, String)>,
 }
@@ -80,6 +82,7 @@ impl<'a> Cursor<'a> {
             tokens: all.into_iter().peekable(),
             place: String::new(),
             fused: "",
+            root: "",
             unexplained: Vec::new(),
         }
     }
@@ -210,6 +213,11 @@ impl<'a> Cursor<'a> {
                 let of = Box::new(self.sum()?);
                 self.expect(")")?;
                 Kind::Free(name, of)
+            }
+            name if name == self.root && self.takes("(") => {
+                let of = Box::new(self.sum()?);
+                self.expect(")")?;
+                Kind::Root(of)
             }
             name if name == self.fused && self.takes("(") => return self.product_and_sum(line),
             word if word.starts_with(|c: char| c.is_ascii_lowercase()) => {

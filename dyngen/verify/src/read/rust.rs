@@ -373,6 +373,7 @@ impl Reader<'_> {
             }
             syn::Expr::MethodCall(call) if call.turbofish.is_none() => {
                 match (call.method.to_string().as_str(), &*call.receiver, call.args.is_empty()) {
+                    ("simd_sqrt", of, true) => Kind::Root(self.boxed(of)?),
                     ("simd_tanh", of, true) => Kind::Free("tanh", self.boxed(of)?),
                     ("column_sum", syn::Expr::MethodCall(product), true)
                         if product.method == "component_mul" && product.args.len() == 1 =>

@@ -35,6 +35,7 @@ pub(crate) fn read(text: &str, literals: &Literals, frames: &[String]) -> Checke
         source: Source::default(),
     };
     reader.text.fused = "fma";
+    reader.text.root = "sqrt";
     for list in ["joint_names", "parameter_names"] {
         reader.listed(text, list);
     }

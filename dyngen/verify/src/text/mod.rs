@@ -30,6 +30,22 @@ typedef unsigned long long uint64_t;
 #pragma STDC FP_CONTRACT OFF
 #endif
 "#;
+/// The square root in C, or in CUDA, rounded once, with the arm's name for NAME.
+#[must_use]
+pub fn root_in_c(is_cuda: bool) -> String {
+    let [single, double] = if is_cuda { ["__fsqrt_rn", "__dsqrt_rn"] } else { ["sqrtf", "sqrt"] };
+    format!(
+        "/* The square root of x, rounded once. */
+#undef root
+#ifdef NAME_FLOAT
+#define root(x) {single}(x)
+#else
+#define root(x) {double}(x)
+#endif
+
+"
+    )
+}
 /// A step of time: the module of an arm whose parameters are passed.
 pub const DISCRETE: &str = include_str!("discrete.rs");
 /// The module `discrete`; where values are baked in, its functions take no parameters.

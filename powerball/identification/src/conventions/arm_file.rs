@@ -61,6 +61,8 @@ pub(super) fn better(asked: &Asked<'_>, found: &Found<'_>) -> Option<Better> {
     // about gravity.
     if worst < NOTICED
         || asked.body.motors().is_some()
+        // The numeric regressor knows no bars that turn on their own.
+        || arm.linkages().next().is_some()
         || found.read.gravity == Gravity::TakenOut && found.steps.len() > 1
     {
         return None;

@@ -7,7 +7,8 @@ use dyngen::exact::rational::to_f64;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// The regressor of all eleven parameters of every link, then of every bar (n × p, row-major) at one state,
-/// for gravity `g` in the base frame.
+/// for gravity `g` in the base frame. Bars of loops that are no parallelograms count as if they were fixed to
+/// the link that carries their pin.
 pub fn regressor(arm: &Arm, q: &[f64], v: &[f64], a: &[f64], g: [f64; 3]) -> Vec<f64> {
     let n = arm.dof();
     let width = 11 * arm.bodies();

@@ -26,6 +26,7 @@ impl Reader<'_> {
         self.prefix = format!("{lower}_");
         self.text.text(&NUMBERS.replace("NAME", &upper).replace("name", &lower), OTHER)?;
         self.fused()?;
+        self.root()?;
         // An arm whose joints all slide has no sines.
         if self.text.peek().is_some_and(|token| token == format!("#ifdef {upper}_FLOAT")) {
             let device = TRIGONOMETRY.replace("\nstatic ", "\nstatic __device__ ");

@@ -6,6 +6,7 @@ use crate::language::{Exact, Expr, Kind, Let, Pattern, Routine};
 use crate::read::cursor::{Cursor, Dialect};
 use crate::read::head::Literals;
 use crate::read::kernel::MOST;
+use crate::text::root_in_c;
 use crate::{Checked, Source, wrong};
 use dyngen_arm::Function;
 use dyngen_arm::exact::rational::integer;
@@ -128,6 +129,7 @@ impl Reader<'_> {
             self.text.text(&CONDITION.replace("NAME", &upper), OTHER)?;
         }
         self.fused()?;
+        self.root()?;
         // An arm whose joints all slide has no sines.
         if self.text.peek().is_some_and(|token| token.starts_with('#')) {
             self.text.text(&TRIGONOMETRY.replace("NAME", &self.upper()), OTHER)?;
@@ -140,6 +142,15 @@ impl Reader<'_> {
         if self.text.peek() == Some("#undef fused") {
             self.text.text(&FUSED.replace("NAME", &self.upper()), OTHER)?;
             self.text.fused = "fused";
+        }
+        Ok(())
+    }
+
+    /// The function that gives a square root, where the file has it.
+    fn root(&mut self) -> Checked<()> {
+        if self.text.peek() == Some("#undef root") {
+            self.text.text(&root_in_c(self.is_cuda).replace("NAME", &self.upper()), OTHER)?;
+            self.text.root = "root";
         }
         Ok(())
     }
