@@ -15,7 +15,7 @@ use powerball_identification::KnownModel;
 use powerball_identification::mounting::Mounting;
 use powerball_logs::log::Log;
 use powerball_logs::regression::{Data, DataOptions, Recording, RigidArm, Signals};
-use powerball_logs::signal::resample::{median_step, smooth_at};
+use powerball_logs::signal::resample::{linear_at, median_step, smooth_at};
 use std::path::{Path, PathBuf};
 
 impl TorqueModel {
@@ -56,7 +56,7 @@ impl TorqueModel {
                     let own = more.iter().zip(&less).skip(j).step_by(recording.dof);
                     let added: Vec<f64> = own.map(|(a, b)| a - b).collect();
                     for k in piece.clone() {
-                        torque[k] -= smooth_at(&grid, &added, log.t[k]);
+                        torque[k] -= linear_at(&grid, &added, log.t[k]);
                     }
                 }
             }
