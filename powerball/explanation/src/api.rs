@@ -1,7 +1,7 @@
 //! The API: from an arm and logs to an explanation.
 
 use super::experiment::propose;
-use super::explain::{Explained, explain_body};
+use super::explain::{Explained, LogResult, explain_body};
 use super::options::{ExplainError, ExplainOptions};
 use super::torque_model::{Colour, TorqueModel};
 use super::watch::WatchOptions;
@@ -12,6 +12,7 @@ use powerball_logs::log::{Log, common_clock};
 use powerball_logs::motion::Motion;
 use powerball_logs::regression::RigidArm;
 use powerball_logs::signal::resample::median_step;
+use std::ops::Range;
 use std::path::Path;
 
 /// Explains what the base model of an arm lacks on `logs`; every addition is judged on `validate`, the logs
@@ -106,7 +107,7 @@ impl Prepared {
         logs
     }
 
-    /// What the explained model leaves on the logs that are like the others; `None` where that cannot be
+    /// What the explained model leaves on logs where nothing else was found; `None` where that cannot be
     /// learnt.
     fn colour(&self, explained: &Explained) -> Option<Colour> {
         let model = &explained.model;
@@ -114,12 +115,13 @@ impl Prepared {
         let changed = (!changes.is_empty()).then(|| RigidArm::new(&changes.of(self.body.arm()).ok()?).ok());
         let changed = changed.map_or(Some(None), |body| body.map(Some))?;
         let body = changed.as_ref().unwrap_or(&self.body);
-        let with_events: Vec<&String> = (explained.effects.iter().flat_map(|effect| &effect.logs))
-            .chain(explained.logs.iter().filter(|log| !log.like_the_others).map(|log| &log.log))
-            .collect();
-        let usual = self.logs.iter().chain(&self.validate).filter(|log| !with_events.contains(&&log.file));
-        let usual: Vec<Log> = usual.cloned().collect();
         let options = WatchOptions::default();
+        let logs = self.logs.iter().chain(&self.validate);
+        let usual = |log: &Log| match explained.logs.iter().find(|result| result.log == log.file) {
+            Some(result) => usual_part(log, result, options.rule.longest_block),
+            None => Some(log.clone()),
+        };
+        let usual: Vec<Log> = logs.filter_map(usual).collect();
         let rate = 1.0 / median_step(&usual.first()?.t)?;
         Colour::learn(model, body, &usual, options.level(rate), options.friction_range)
     }
@@ -134,5 +136,63 @@ impl Prepared {
             explained.model.additions = known.additions.and(&explained.model.additions);
         }
         explained
+    }
+}
+
+/// A log without the times of what differs there from the other logs, and `apart` s before and after: these
+/// are known roughly. `None` where it differs and nothing explains that, or nothing stays.
+fn usual_part(log: &Log, result: &LogResult, apart: f64) -> Option<Log> {
+    if !result.like_the_others && result.differs.is_empty() {
+        return None;
+    }
+    let differs =
+        |t: f64| result.differs.iter().any(|d| (d.start_time - apart..=d.end_time + apart).contains(&t));
+    let parts = |piece: &Range<usize>| -> Vec<Range<usize>> {
+        let kept: Vec<usize> = piece.clone().filter(|k| !differs(log.t[*k])).collect();
+        kept.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..run[0] + run.len()).collect()
+    };
+    let mut log = log.clone();
+    log.pieces = log.pieces.iter().flat_map(parts).filter(|piece| piece.len() >= 2).collect();
+    (!log.pieces.is_empty()).then_some(log)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explain::Difference;
+
+    #[test]
+    fn the_usual_part_of_a_log_is_without_what_was_found_there() {
+        let t: Vec<f64> = (0..1000).map(|k| 0.01 * f64::from(k)).collect();
+        let log = Log {
+            file: "log.csv".into(),
+            q: vec![t.clone()],
+            torque: vec![t.clone()],
+            temperature: None,
+            motor: None,
+            pieces: vec![0..400, 400..1000],
+            doubts: Vec::new(),
+            clock: 0.0,
+            t,
+        };
+        let push = |start_time, end_time| Difference {
+            effect: "contact_wrench".into(),
+            joints: Vec::new(),
+            start_time,
+            end_time,
+            share: 1.0,
+            value: None,
+        };
+        let pieces = |like_the_others, differs| {
+            let result = LogResult { log: "log.csv".into(), like_the_others, error_ratio: None, differs };
+            usual_part(&log, &result, 0.5).map(|log| log.pieces)
+        };
+        assert_eq!(pieces(true, vec![]), Some(vec![0..400, 400..1000]));
+        assert_eq!(
+            pieces(false, vec![push(3.004, 4.0), push(6.0, 6.196)]),
+            Some(vec![0..251, 451..550, 670..1000])
+        );
+        assert_eq!(pieces(false, vec![push(0.0, 9.99)]), None);
+        assert_eq!(pieces(false, vec![]), None);
     }
 }

@@ -5,6 +5,7 @@ use super::{Axis, ByJoint, Candidate, Class, Context, Effect, Found, Part};
 use crate::rule::Rule;
 use powerball_controller::JointNumber;
 use powerball_logs::regression::{Column, Data};
+use powerball_logs::signal::resample::later;
 use serde::Serialize;
 use std::ops::Range;
 
@@ -107,57 +108,4 @@ impl Effect for TimeDelay {
 
 fn delay(candidate: &Candidate) -> f64 {
     Settings::of(candidate).map_or(f64::NAN, |settings| settings.delay)
-}
-
-/// Samples that a value between samples is computed from.
-const AROUND: isize = 8;
-
-/// A signal that is late by a number of samples; the first or last value beyond its ends.
-///
-/// By the polynomial through the [`AROUND`] nearest samples: a straight line between two of them makes a
-/// signal also weaker where it is fast, by 19 % at half a sample and a fifth of the sample rate, and a log
-/// whose torque is weaker there would seem to be late.
-pub(crate) fn later(x: &[f64], by: f64) -> Vec<f64> {
-    let Some(last) = x.len().checked_sub(1) else { return Vec::new() };
-    let (whole, part) = (by.ceil() as isize, by.ceil() - by);
-    let near = || 1 - AROUND / 2..=AROUND / 2;
-    let weight = |m: isize| -> f64 {
-        near().filter(|other| *other != m).map(|other| (part - other as f64) / (m - other) as f64).product()
-    };
-    let weights: Vec<(isize, f64)> = near().map(|m| (m.saturating_sub(whole), weight(m))).collect();
-    let at = |k: usize| {
-        let sample = |(m, w): &(isize, f64)| w * x[k.saturating_add_signed(*m).min(last)];
-        weights.iter().map(sample).sum()
-    };
-    (0..x.len()).map(at).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::later;
-    use std::f64::consts::TAU;
-
-    /// A wave that is late by a part of a sample is as strong as before, up to the band of the rows.
-    #[test]
-    fn what_is_late_is_as_strong_as_before() {
-        for (cycles, most) in [(0.02, 1e-8), (0.1, 2e-4), (0.2, 6e-3)] {
-            let wave = |by: f64| -> Vec<f64> {
-                (0..500).map(|k| (TAU * cycles * (f64::from(k) - by)).sin()).collect()
-            };
-            for by in [0.5, 3.3, -0.4, -7.0] {
-                let (late, truth) = (later(&wave(0.0), by), wave(by));
-                let error = (10..490).map(|k| (late[k] - truth[k]).abs()).fold(0.0, f64::max);
-                assert!(error < most, "{cycles} cycles a sample, {by} samples: {error}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_signal_goes_on_beyond_its_ends() {
-        assert_eq!(later(&[1.0, 2.0, 4.0], 5.0), [1.0; 3]);
-        assert_eq!(later(&[1.0, 2.0, 4.0], -5.0), [4.0; 3]);
-        assert_eq!(later(&[1.0, 2.0, 4.0], 1.0), [1.0, 1.0, 2.0]);
-        approx::assert_relative_eq!(later(&[3.0], 0.5)[0], 3.0, max_relative = 1e-12);
-        assert!(later(&[], 0.5).is_empty());
-    }
 }

@@ -15,7 +15,7 @@ use powerball_identification::KnownModel;
 use powerball_identification::mounting::Mounting;
 use powerball_logs::log::Log;
 use powerball_logs::regression::{Data, DataOptions, Recording, RigidArm, Signals};
-use powerball_logs::signal::resample::median_step;
+use powerball_logs::signal::resample::{linear_at, median_step, smooth_at};
 use std::path::{Path, PathBuf};
 
 impl TorqueModel {
@@ -56,7 +56,7 @@ impl TorqueModel {
                     let own = more.iter().zip(&less).skip(j).step_by(recording.dof);
                     let added: Vec<f64> = own.map(|(a, b)| a - b).collect();
                     for k in piece.clone() {
-                        torque[k] -= between(&grid, &added, log.t[k]);
+                        torque[k] -= linear_at(&grid, &added, log.t[k]);
                     }
                 }
             }
@@ -168,25 +168,13 @@ impl LogChanges {
             for (j, torque) in log.torque.iter_mut().enumerate().filter(|(j, _)| self.late(*j) != 0.0) {
                 let logged = torque.clone();
                 for piece in &log.pieces {
-                    for k in piece.clone() {
-                        torque[k] =
-                            between(&log.t[piece.clone()], &logged[piece.clone()], log.t[k] + self.late(j));
+                    let (t, x) = (&log.t[piece.clone()], &logged[piece.clone()]);
+                    for (torque, at) in torque[piece.clone()].iter_mut().zip(t) {
+                        *torque = smooth_at(t, x, at + self.late(j));
                     }
                 }
             }
         }
-    }
-}
-
-/// A signal at a time between its samples; at its ends what is there.
-fn between(t: &[f64], x: &[f64], at: f64) -> f64 {
-    let next = t.partition_point(|t| *t < at).clamp(1, t.len().max(2) - 1);
-    match (t.get(next - 1), t.get(next)) {
-        (Some(a), Some(b)) if b > a => {
-            let share = ((at - a) / (b - a)).clamp(0.0, 1.0);
-            x[next - 1] * (1.0 - share) + x[next] * share
-        }
-        _ => x[next - 1],
     }
 }
 

@@ -17,7 +17,7 @@ mod source;
 #[cfg(test)]
 pub(crate) mod tests;
 
-use crate::effects::{PASSES, SOFT, Window, each_instant, move_link, time_delay};
+use crate::effects::{PASSES, SOFT, Window, each_instant, move_link};
 pub use colour::{Colour, JointColour};
 pub use detector::Detector;
 use dyngen::arm::ParameterKind;
@@ -31,6 +31,7 @@ use powerball_controller::friction::TanhFriction;
 use powerball_identification::estimate::{JointFriction, ParameterEstimate, in_set_of};
 use powerball_logs::parallel;
 use powerball_logs::regression::{Data, Recording, RigidArm, Signals};
+use powerball_logs::signal::resample::later;
 pub use rows::{BAND, Rows, Shown, rows_a_second};
 use serde::{Deserialize, Serialize};
 pub use source::{ForC, Scalar, SourceError};
@@ -261,7 +262,7 @@ impl TorqueModel {
         for j in (0..n).filter(|j| self.additions.log_changes.late(*j) != 0.0) {
             let shift = self.additions.log_changes.late(j) * recording.rate;
             let own: Vec<f64> = torque.iter().skip(j).step_by(n).copied().collect();
-            let late = time_delay::later(&own, shift);
+            let late = later(&own, shift);
             torque.iter_mut().skip(j).step_by(n).zip(late).for_each(|(value, late)| *value = late);
         }
         torque

@@ -3,7 +3,9 @@
 use super::*;
 use dyngen::Arm;
 use powerball_controller::correction::Law;
+use powerball_logs::log::Log;
 use powerball_logs::regression::{Recording, RigidArm};
+use std::f64::consts::TAU;
 
 pub(crate) fn every_law() -> Vec<Law<f64>> {
     vec![
@@ -126,6 +128,33 @@ fn every_law_comes_back_from_the_file() {
     assert_eq!(json["terms"][13]["joint"], 2);
     assert_eq!(json["terms"][13]["law"], "other_direction");
     assert_eq!(json["terms"][13]["other"], 4);
+}
+
+/// A known delay is taken out of fast torques too: 20 Hz at 100 samples a second.
+#[test]
+fn a_known_delay_makes_a_torque_early_and_not_weaker() {
+    let body = body();
+    let mut known = model(&body, &[]);
+    known.additions.log_changes.delay = vec![0.0045; body.dof()];
+    let t: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).collect();
+    let wave = |late: f64| -> Vec<f64> { t.iter().map(|t| (20.0 * TAU * (t - late)).sin()).collect() };
+    let log = Log {
+        file: "log.csv".into(),
+        q: vec![vec![0.0; t.len()]; body.dof()],
+        torque: vec![wave(0.0045); body.dof()],
+        temperature: None,
+        motor: None,
+        pieces: vec![0..200, 200..400],
+        doubts: Vec::new(),
+        clock: 0.0,
+        t: t.clone(),
+    };
+    let mut logs = [log];
+    known.take_out(&body, &mut logs);
+    let truth = wave(0.0);
+    for k in (10..190).chain(210..390) {
+        approx::assert_abs_diff_eq!(logs[0].torque[1][k], truth[k], epsilon = 6e-3);
+    }
 }
 
 #[test]
