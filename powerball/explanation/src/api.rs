@@ -3,6 +3,7 @@
 use super::experiment::propose;
 use super::explain::{Explained, LogResult, explain_body};
 use super::options::{ExplainError, ExplainOptions};
+use super::rule::Rule;
 use super::torque_model::{Colour, TorqueModel};
 use super::watch::WatchOptions;
 use dyngen::Arm;
@@ -118,7 +119,7 @@ impl Prepared {
         let options = WatchOptions::default();
         let logs = self.logs.iter().chain(&self.validate);
         let usual = |log: &Log| match explained.logs.iter().find(|result| result.log == log.file) {
-            Some(result) => usual_part(log, result, options.rule.longest_block),
+            Some(result) => usual_part(log, result, &options.rule),
             None => Some(log.clone()),
         };
         let usual: Vec<Log> = logs.filter_map(usual).collect();
@@ -139,12 +140,14 @@ impl Prepared {
     }
 }
 
-/// A log without the times of what differs there from the other logs, and `apart` s before and after: these
-/// are known roughly. `None` where it differs and nothing explains that, or nothing stays.
-fn usual_part(log: &Log, result: &LogResult, apart: f64) -> Option<Log> {
-    if !result.like_the_others && result.differs.is_empty() {
+/// A log without the times of what differs there from the other logs, and the longest block before and after:
+/// these times are known roughly. `None` where its error is larger than that of the others with these
+/// differences in the model, or nothing stays.
+fn usual_part(log: &Log, result: &LogResult, rule: &Rule) -> Option<Log> {
+    if result.error_ratio.is_some_and(|ratio| ratio > rule.unlike) {
         return None;
     }
+    let apart = rule.longest_block;
     let differs =
         |t: f64| result.differs.iter().any(|d| (d.start_time - apart..=d.end_time + apart).contains(&t));
     let parts = |piece: &Range<usize>| -> Vec<Range<usize>> {
@@ -183,16 +186,16 @@ mod tests {
             share: 1.0,
             value: None,
         };
-        let pieces = |like_the_others, differs| {
-            let result = LogResult { log: "log.csv".into(), like_the_others, error_ratio: None, differs };
-            usual_part(&log, &result, 0.5).map(|log| log.pieces)
+        let rule = Rule { longest_block: 0.5, unlike: 2.0, ..Rule::default() };
+        let pieces = |ratio, differs| {
+            let error_ratio = Some(ratio);
+            let result = LogResult { log: "log.csv".into(), like_the_others: false, error_ratio, differs };
+            usual_part(&log, &result, &rule).map(|log| log.pieces)
         };
-        assert_eq!(pieces(true, vec![]), Some(vec![0..400, 400..1000]));
-        assert_eq!(
-            pieces(false, vec![push(3.004, 4.0), push(6.0, 6.196)]),
-            Some(vec![0..251, 451..550, 670..1000])
-        );
-        assert_eq!(pieces(false, vec![push(0.0, 9.99)]), None);
-        assert_eq!(pieces(false, vec![]), None);
+        assert_eq!(pieces(1.0, vec![]), Some(vec![0..400, 400..1000]));
+        let pushes = vec![push(3.004, 4.0), push(6.0, 6.196)];
+        assert_eq!(pieces(1.0, pushes.clone()), Some(vec![0..251, 451..550, 670..1000]));
+        assert_eq!(pieces(1.0, vec![push(0.0, 9.99)]), None);
+        assert_eq!([pieces(3.0, vec![]), pieces(3.0, pushes)], [None, None]);
     }
 }

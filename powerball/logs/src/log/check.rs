@@ -5,7 +5,7 @@ use super::read::{Effort, GOAL, Raw};
 use super::{Doubt, Finding, Log, LogError, Motors, Severity, Warnings, outliers, signal_checks};
 use crate::signal::resample::median_step;
 use dyngen::Arm;
-use dyngen::arm::JointKind;
+use dyngen::arm::{Joint, JointKind};
 use std::f64::consts::PI;
 use std::mem::take;
 use std::ops::Range;
@@ -236,10 +236,15 @@ fn pieces(
     pieces
 }
 
+/// The joint of a column: those that follow others have none.
+pub(super) fn of_column(arm: &Arm, j: usize) -> &Joint {
+    arm.moving_joints().nth(j).unwrap_or(&arm.joints[j])
+}
+
 /// How far a joint can move in some time, rad or m: five times its speed limit, and always a few steps of an
 /// encoder.
 pub(super) fn farthest(arm: &Arm, j: usize, seconds: f64) -> f64 {
-    (5.0 * arm.joints[j].velocity.unwrap_or(10.0) * seconds).max(0.02)
+    (5.0 * of_column(arm, j).velocity.unwrap_or(10.0) * seconds).max(0.02)
 }
 
 /// The joints' torques of those that the motors' currents make: where a transmission couples joints a motor's
@@ -277,7 +282,7 @@ fn unwrap(
     file: &str,
     findings: &mut Vec<Finding>,
 ) {
-    if arm.joints[j].kind != JointKind::Revolute {
+    if of_column(arm, j).kind != JointKind::Revolute {
         return;
     }
     let (mut turns, mut wraps, mut first) = (0.0, 0usize, None);
@@ -336,7 +341,7 @@ fn units(
     findings: &mut Vec<Finding>,
     errors: &mut Vec<Finding>,
 ) {
-    let joint = &arm.joints[j];
+    let joint = of_column(arm, j);
     let mut error = |quantity: String, message: String| {
         errors.push(Finding { file: file.to_string(), line: None, quantity, message });
     };

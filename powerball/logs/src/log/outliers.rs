@@ -4,6 +4,7 @@
 //! signal is what it is.
 
 use super::Finding;
+use super::check::{farthest, of_column};
 use super::read::{Effort, GOAL, Raw};
 use dyngen::Arm;
 use dyngen::arm::JointKind;
@@ -29,7 +30,7 @@ pub(super) fn leave_out(
     let name = effort.name();
     let mut keep = vec![true; raw.t.len()];
     for j in 0..arm.dof() {
-        let limit = match (effort, arm.joints[j].torque) {
+        let limit = match (effort, of_column(arm, j).torque) {
             (Effort::Current(constants), Some(limit)) => Some(limit / constants[j].abs()),
             (Effort::Torque, limit) => limit,
             (Effort::Current(_) | Effort::Goal, _) => None,
@@ -96,13 +97,13 @@ fn quantile(values: impl Iterator<Item = f64>, share: f64) -> Option<f64> {
 /// Positions that the joint leaves and comes back to within a few samples, faster than it can move.
 fn jumps(raw: &Raw, j: usize, arm: &Arm) -> Vec<usize> {
     let (q, t) = (&raw.q[j], &raw.t);
-    let turns = arm.joints[j].kind == JointKind::Revolute;
+    let turns = of_column(arm, j).kind == JointKind::Revolute;
     let apart = |a: usize, b: usize| {
         let step = (q[b] - q[a]).abs();
         // A whole turn is a wrap of the angle.
         if turns { step.min((step - TAU).abs()) } else { step }
     };
-    let within = |a: usize, b: usize| apart(a, b) <= super::check::farthest(arm, j, t[b] - t[a]);
+    let within = |a: usize, b: usize| apart(a, b) <= farthest(arm, j, t[b] - t[a]);
     let (mut found, mut k) = (Vec::new(), 1);
     while k < q.len() {
         let back = (1..=LONGEST_JUMP).find(|m| k + m < q.len() && within(k - 1, k + m));

@@ -299,6 +299,18 @@ fn a_unit_is_that_of_joints_that_can_have_it() {
     assert!(wrong.contains("q2: reaches 1000.0, the joint 2.000 m") && wrong.contains("\"mm\""), "{wrong}");
 }
 
+/// A joint that follows another has no column, and the next column is the next joint's.
+#[test]
+fn a_joint_that_follows_has_no_column() {
+    let (first, second) = ARM.rsplit_once("[[joint]]").unwrap();
+    let follower = second.replace("revolute", "prismatic") + "position = [0, 0.3]\nmimic = { joint = 1 }\n";
+    let arm = format!("{first}[[joint]]{follower}[[joint]]{second}");
+    let arm = Arm::parse(&arm, "three.toml").unwrap();
+    let mut findings = Vec::new();
+    parse(text(HEADER, |_, f| Some(f.join(","))).as_bytes(), "x.csv", &arm, &mut findings).unwrap();
+    assert!(findings.iter().all(|found| found.quantity != "q2"), "{findings:?}");
+}
+
 /// What people give by mistake is named by what it is.
 #[test]
 fn files_of_other_kinds_are_named() {
