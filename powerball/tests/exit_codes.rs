@@ -205,6 +205,22 @@ fn a_watch_ends_with_what_it_found() {
         assert!(text.lines().last().unwrap().starts_with(last), "{log}: {text}");
     }
     assert_eq!(code(&powerball(&folder, &format!("{watch} changed.csv --exit-zero"))), 0);
+    // With --quiet the exit code is the answer; in JSON the events are there all the same.
+    for (more, log, lines, ends) in
+        [("", "b.csv", 0, 0), ("", "changed.csv", 0, 1), ("--json", "changed.csv", 1, 1)]
+    {
+        let done = powerball(&folder, &format!("{watch} {log} --quiet {more}"));
+        let text = String::from_utf8_lossy(&done.stdout).into_owned();
+        assert_eq!((code(&done), text.lines().count() > 0), (ends, lines > 0), "{log} {more}: {text}");
+        assert!(done.stderr.is_empty(), "{}", said(&done));
+    }
+    // A model that holds over a moment has not been judged.
+    let all = log("t,q1,tau1", 0.0);
+    let moment = all.lines().take(1 + 1000 + 60).collect::<Vec<_>>().join("\n");
+    std::fs::write(folder.join("moment.csv"), moment).unwrap();
+    let done = powerball(&folder, &format!("{watch} b.csv moment.csv"));
+    assert_eq!(code(&done), 3, "{}", said(&done));
+    assert!(said(&done).contains("moment.csv: 0."), "{}", said(&done));
     // In JSON each line on standard output is an event.
     let done = powerball(&folder, &format!("{watch} changed.csv --json"));
     assert_eq!(code(&done), 1);

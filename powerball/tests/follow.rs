@@ -144,6 +144,12 @@ fn a_run_that_is_stopped_keeps_its_log() {
         );
         let log = std::fs::read_to_string(out.join("log.csv")).unwrap();
         assert!(log.lines().count() > 1 && whole(&log), "{log}");
+        // Its folder is its own: the next run needs no --force. A recording of the same form is another's.
+        assert_eq!(powerball(&arguments).status.code(), Some(1));
+        std::fs::remove_file(out.join("report.html")).unwrap();
+        let refused = powerball(&arguments);
+        assert_eq!(refused.status.code(), Some(2), "{}", self::complaint(&refused));
+        assert_eq!(std::fs::read_to_string(out.join("log.csv")).unwrap(), log);
     }
     let refused =
         powerball(&["follow", "--trajectory", &path, "--model", &model, "--give", "0.6", "--out", "x"]);

@@ -119,8 +119,9 @@ fn a_change_is_one_event_and_no_change_is_none() {
         assert!(String::from_utf8_lossy(&output.stderr).contains("15 s of motion are taken as good"));
         // The same rows from a pipe, as CSV and as objects.
         let streamed = events(&run(&[&base[..], &["-"]].concat(), Some(&csv)));
+        let named = events(&run(&[&base[..], &["--log", "-"]].concat(), Some(&csv)));
         let objects = events(&run(&[&base[..], &["-"]].concat(), Some(&as_objects(&csv))));
-        for other in [&streamed, &objects] {
+        for other in [&streamed, &named, &objects] {
             assert_eq!(other.len(), found.len(), "{name}: {other:?}");
             for (a, b) in other.iter().zip(&found) {
                 let since = |event: &Value| event["since"].as_f64().unwrap();
@@ -212,6 +213,7 @@ fn what_cannot_be_watched_is_said_before_anything_is_computed() {
         (vec!["--model", &model, "-"], Some("t,q1,q2,tau1,tau2\n0,0,0,0,0\n"), "at least 40 are needed"),
         (vec!["--model", &model, "-"], Some("{\"t\": 0,\n"), "line 1: is not a JSON object"),
         (vec!["--model", &model, "--bus", "virtual"], None, "the arm file has 2 joints"),
+        (vec!["--model", &model, "--log", "-"], Some("t,q1,q2,i1,i2\n0,0,0,0,0\n"), "no torque_constant"),
         (vec!["--model", &model], None, "required"),
         (vec!["--model", &model, "--log", &log, "--friction-range", "2"], None, "give a share"),
     ] {

@@ -42,7 +42,7 @@ pub(super) fn run(data: &Path) -> Result<(), String> {
         for log in read(watched)? {
             println!("{}: {:.0} s", log.file, log.t.last().unwrap_or(&0.0) - log.t.first().unwrap_or(&0.0));
             for event in events(&body, &model, &WatchOptions::default(), &log) {
-                println!("  {} (left {:.2})", event.sentence(), event.evidence.left);
+                println!("  {} (left {:.2})", event.sentence(body.arm()), event.evidence.left);
             }
         }
     }

@@ -98,9 +98,12 @@ fn count(tally: &mut Tally, kind: &str, change: &Changed, body: &RigidArm, model
     tally.right += usize::from(event.what == kind);
     if event.what != kind {
         let (rivals, left) = (&event.evidence.rivals, event.evidence.left);
-        println!("  {kind} on {joint} at {at:.2}: {} rivals {rivals:?} left {left:.2}", event.sentence());
+        println!(
+            "  {kind} on {joint} at {at:.2}: {} rivals {rivals:?} left {left:.2}",
+            event.sentence(body.arm())
+        );
     }
-    after.for_each(|more| println!("  {kind} on {joint} at {at:.2}: then {}", more.sentence()));
+    after.for_each(|more| println!("  {kind} on {joint} at {at:.2}: then {}", more.sentence(body.arm())));
 }
 
 /// How long it takes one who knows the change, when it begins and that the noise is normal: the likelihood

@@ -14,7 +14,7 @@ pub(super) enum Change {
     Payload { mass: f64, com: [f64; 3] },
     /// A force in the base frame, N, at the origin of a link's frame.
     Force { force: [f64; 3], link: JointNumber },
-    /// Logged less true position, rad.
+    /// Logged less true position, rad or m.
     Offset { joint: JointNumber, by: f64 },
     /// Additional delay of torques, s.
     Delay { joints: Vec<JointNumber>, by: f64 },
@@ -30,6 +30,15 @@ impl Change {
             (Change::Payload { .. }, Change::Payload { .. })
             | (Change::Force { .. }, Change::Force { .. }) => true,
             _ => false,
+        }
+    }
+
+    /// The joints that changed; none for what pulls at the arm as a whole.
+    pub(super) fn joints(&self) -> &[JointNumber] {
+        match self {
+            Change::Friction { joint, .. } | Change::Offset { joint, .. } => std::slice::from_ref(joint),
+            Change::Delay { joints, .. } => joints,
+            Change::Payload { .. } | Change::Force { .. } => &[],
         }
     }
 

@@ -1,6 +1,8 @@
 //! The events of a watch: one for each change.
 
-use crate::effects::words::number;
+use crate::effects::words::{Words, number};
+use dyngen::Arm;
+use dyngen::arm::JointKind;
 use powerball_controller::JointNumber;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -13,7 +15,7 @@ pub struct Event {
     pub time: f64,
     /// An effect's name, or "unknown".
     pub what: String,
-    /// The joints on which it shows.
+    /// The joints that changed (friction, a sensor's zero, a delay), else those on which the change shows.
     pub joints: Vec<JointNumber>,
     /// The event's size in SI units, as `parameters` of explained.json.
     pub value: Map<String, Value>,
@@ -44,9 +46,9 @@ pub struct Evidence {
 }
 
 impl Event {
-    /// A line for people.
+    /// A line for people; `arm` says which joints slide.
     #[must_use]
-    pub fn sentence(&self) -> String {
+    pub fn sentence(&self, arm: &Arm) -> String {
         let joints: Vec<String> = self.joints.iter().map(ToString::to_string).collect();
         let plural = if joints.len() == 1 { "" } else { "s" };
         let verb = if self.evidence.ends { " ends" } else { "" };
@@ -58,8 +60,10 @@ impl Event {
             joints.join(", "),
             self.since
         );
+        let first = self.joints.first().and_then(|joint| arm.joints.get(joint.index()));
+        let slides = first.is_some_and(|joint| joint.kind == JointKind::Prismatic);
         for (name, value) in &self.value {
-            let _ = write!(text, ", {} {}", name.replace('_', " "), shown(name, value));
+            let _ = write!(text, ", {} {}", name.replace('_', " "), shown(name, value, slides));
         }
         if !self.evidence.rivals.is_empty() {
             let _ = write!(text, "; or {}", self.evidence.rivals.join(" or "));
@@ -68,15 +72,15 @@ impl Event {
     }
 }
 
-/// A size with its unit.
-fn shown(name: &str, value: &Value) -> String {
+/// A size with its unit; that of a position is by whether its joint slides.
+fn shown(name: &str, value: &Value, slides: bool) -> String {
     let (factor, unit) = match name {
-        "mass" => (1.0, " kg"),
-        "com" => (1.0, " m"),
-        "force" => (1.0, " N"),
-        "delay" | "end_time" => (1.0, " s"),
-        "offset" => (1.0, " N·m"),
-        "change" => (100.0, " %"),
+        "mass" => (1.0, "kg"),
+        "com" => (1.0, "m"),
+        "force" => (1.0, "N"),
+        "delay" | "end_time" => (1.0, "s"),
+        "offset" => (1.0, Words { slides, relative_std: &[] }.position()),
+        "change" => (100.0, "%"),
         _ => (1.0, ""),
     };
     let one = |value: &Value| match value {
@@ -85,9 +89,10 @@ fn shown(name: &str, value: &Value) -> String {
         Value::String(text) => text.clone(),
         other => other.to_string(),
     };
+    let gap = if unit.is_empty() { "" } else { " " };
     match value {
-        Value::Array(list) => format!("({}){unit}", list.iter().map(one).collect::<Vec<_>>().join(", ")),
-        single => format!("{}{unit}", one(single)),
+        Value::Array(list) => format!("({}){gap}{unit}", list.iter().map(one).collect::<Vec<_>>().join(", ")),
+        single => format!("{}{gap}{unit}", one(single)),
     }
 }
 
@@ -100,12 +105,14 @@ mod tests {
     fn sizes_have_units_and_links_are_whole() {
         for (name, value, text) in [
             ("mass", json!(0.503), "0.503 kg"),
+            ("offset", json!(0.02), "0.0200 rad"),
             ("force", json!([1.0, -2.5, 0.0]), "(1.00, −2.50, 0) N"),
             ("link", json!(6), "6"),
             ("change", json!([-0.2, 0.1]), "(−20.0, 10.0) %"),
             ("friction", json!("warmer"), "warmer"),
         ] {
-            assert_eq!(shown(name, &value), text);
+            assert_eq!(shown(name, &value, false), text);
         }
+        assert_eq!(shown("offset", &json!(0.02), true), "0.0200 m");
     }
 }

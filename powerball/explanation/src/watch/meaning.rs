@@ -141,7 +141,7 @@ impl Stream<'_> {
         };
         if let Some(change) = found.over {
             self.changes.retain(|own| *own != change);
-            return Some(event(change.name(), Vec::new(), Map::new(), pending.since));
+            return Some(event(change.name(), change.joints().to_vec(), Map::new(), pending.since));
         }
         let Some(named) = found.named else {
             // A change without a name is taken as good from now on.

@@ -13,6 +13,7 @@ mod stream;
 
 use crate::rule::Rule;
 use crate::torque_model::{TorqueModel, rows_a_second};
+use dyngen::Arm;
 pub use event::{Event, Evidence};
 use powerball_controller::JointNumber;
 use powerball_logs::log::LiveSample;
@@ -82,6 +83,12 @@ impl<'a> Watch<'a> {
         Watch { setting: Setting { body, model, options, file }, first: Vec::new(), stream: None }
     }
 
+    /// The arm that is watched.
+    #[must_use]
+    pub fn arm(&self) -> &Arm {
+        self.setting.body.arm()
+    }
+
     /// Notes about the stream in addition to events; each once.
     pub fn notes(&mut self) -> Vec<String> {
         self.stream.as_mut().map(Stream::notes).unwrap_or_default()
@@ -109,6 +116,16 @@ impl<'a> Watch<'a> {
     pub fn watched(&self) -> Vec<JointNumber> {
         let colours = self.stream.iter().flat_map(|stream| stream.colours.iter().enumerate());
         colours.filter(|(_, colour)| colour.is_some()).map(|(j, _)| JointNumber::from_index(j)).collect()
+    }
+
+    /// Why the stream so far is no evidence that the model holds: how much motion it has, and how much is
+    /// needed. `None` where it is enough.
+    #[must_use]
+    pub fn unjudged(&self) -> Option<String> {
+        match &self.stream {
+            Some(stream) => stream.unjudged(),
+            None => Some(format!("{} samples are too few: at least {FIRST} are needed", self.first.len())),
+        }
     }
 
     /// Whether there were enough samples to start.

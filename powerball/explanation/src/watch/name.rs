@@ -270,6 +270,10 @@ impl<'a> Stretch<'a> {
         names.retain(|named| named.score >= self.rule.least_score);
         names.sort_by(|a, b| b.score.total_cmp(&a.score));
         for named in &mut names {
+            named.joints = named.changes.iter().flat_map(Change::joints).copied().collect();
+            if !named.joints.is_empty() {
+                continue;
+            }
             let by_joint = self.by_joint(&named.columns, &named.coefficients, &named.edges());
             let shows = |j: &usize| by_joint[*j] > SHOWS;
             named.joints = (0..self.data.dof()).filter(shows).map(JointNumber::from_index).collect();

@@ -5,6 +5,7 @@ use super::buffer::Buffer;
 use super::changes::{self, Change};
 use super::event::Event;
 use crate::torque_model::{Colour, Detector, JointColour, Rows, rows_a_second};
+use powerball_controller::change::WINDOW;
 use powerball_logs::log::{LiveSample, logs_of_motors};
 use powerball_logs::regression::{DataOptions, Recording};
 
@@ -42,6 +43,8 @@ pub(super) struct Stream<'a> {
     /// Rows of joints whose colour is learnt, one entry for each stretch.
     learning: Vec<Rows>,
     learns: Vec<bool>,
+    /// Rows in motion that the bets were given.
+    judged: usize,
     pub(super) changes: Vec<Change>,
     pub(super) pending: Option<Pending>,
     /// Time at which the cause of an alarm is searched again, s.
@@ -70,6 +73,7 @@ impl<'a> Stream<'a> {
             colours,
             learning: Vec::new(),
             learns: vec![known.is_none(); n],
+            judged: 0,
             changes: Vec::new(),
             pending: None,
             ask: f64::NEG_INFINITY,
@@ -101,6 +105,19 @@ impl<'a> Stream<'a> {
     /// The stream ends.
     pub(super) fn finish(&mut self) -> Vec<Event> {
         self.hop(true)
+    }
+
+    /// Why the stream is no evidence that the model holds: a bet knows the size of a change only after
+    /// [`WINDOW`] rows in motion.
+    pub(super) fn unjudged(&self) -> Option<String> {
+        let (judged, step) = (self.judged as f64, self.row_step());
+        (judged < WINDOW).then(|| {
+            format!(
+                "{:.2} s of motion could be judged; at least {:.2} s are needed",
+                judged * step,
+                WINDOW * step
+            )
+        })
     }
 
     /// Restarts all bets.
@@ -159,6 +176,7 @@ impl<'a> Stream<'a> {
         let start = self.start.unwrap_or(0.0);
         let number = ((rows.t[k] - start) / self.row_step()).round() as u64;
         let moves = self.detector.update(rows.row(k), number);
+        self.judged += usize::from(moves);
         if !moves || self.pending.is_some() {
             return;
         }

@@ -8,7 +8,7 @@ use super::result::{
     TorqueDifference,
 };
 use super::side::Side;
-use super::strokes::changes;
+use super::strokes::{changes, wanders};
 use crate::estimate::distribution::{f_tail, t_critical};
 use crate::estimate::{Solver, Uncertainty, friction_row};
 use faer::Mat;
@@ -133,8 +133,9 @@ impl Differences {
     }
 }
 
-/// The difference of each joint's friction, by the strokes of one path where both fits have one, else by the
-/// curves.
+/// The difference of each joint's friction: by the curves, and along one path by the strokes too, which take
+/// half of the joint's share of the level. Strokes see a change of all friction first; what changes at low
+/// velocity alone shows in the curves only, as strokes are compared where they are fast.
 fn friction_differences(
     curves: &[Curves],
     [a, b]: [&Side; 2],
@@ -149,14 +150,18 @@ fn friction_differences(
     };
     let on_one_path = changes(&a.strokes, &b.strokes);
     let difference = |curves: &Curves| {
-        let f = curves.difference(p, share);
-        match on_one_path.get(f.joint - 1).copied().flatten() {
-            Some(change) => {
-                let (p_value, change) = (change.p_value(), change.interval(share));
-                FrictionDifference { p_value, change, differs: p_value < share, ..f }
-            }
-            None => FrictionDifference { differs: f.differs && shows(&f), ..f },
-        }
+        let Some(strokes) = on_one_path.get(curves.joint).copied().flatten() else {
+            let f = curves.difference(p, share);
+            return FrictionDifference { differs: f.differs && shows(&f), ..f };
+        };
+        let half = 0.5 * share;
+        let f = curves.difference(p, half);
+        let by_strokes = strokes.p_value() < half;
+        let (own, change, differs) = match f.differs && shows(&f) && !wanders(f.change) && !by_strokes {
+            true => (f.p_value, f.change, true),
+            false => (strokes.p_value(), strokes.interval(half), by_strokes),
+        };
+        FrictionDifference { p_value: (2.0 * own).min(1.0), change, differs, ..f }
     };
     curves.iter().map(difference).collect()
 }

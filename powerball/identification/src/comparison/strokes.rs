@@ -133,6 +133,11 @@ fn matched(a: &[Stroke], b: &[Stroke]) -> Option<Vec<(Stroke, Stroke)>> {
     (pairs.len() as f64 >= (1.0 - OTHERS) * shortest as f64).then_some(pairs)
 }
 
+/// Whether an interval of a change, as a share of friction, has sizes in it by which friction wanders alone.
+pub(super) fn wanders([low, high]: [f64; 2]) -> bool {
+    low <= WANDERS && high >= -WANDERS
+}
+
 impl Change {
     fn of(pairs: &[(Stroke, Stroke)]) -> Option<Change> {
         let one_way = |side: f64| -> Option<[f64; 3]> {

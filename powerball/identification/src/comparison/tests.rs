@@ -15,7 +15,7 @@ use powerball_logs::chain::Chain;
 use powerball_logs::log::Log;
 use powerball_logs::regression::{DataOptions, RigidArm};
 use powerball_logs::summary::Bands;
-use powerball_virtual_arm::{Body, Dynamics, Plant, lwa4p};
+use powerball_virtual_arm::{Body, Dynamics, Plant, PlantEffect, lwa4p};
 use rand::{RngExt, SeedableRng};
 use std::sync::LazyLock;
 
@@ -237,4 +237,32 @@ fn a_tenth_of_friction_is_seen_along_one_path() {
     let plant = lwa4p::plant().unwrap();
     let elsewhere = strokes(&plant.record(&other.sample(plant.sensors().rate), 0.0, 7).log("virtual"));
     assert!(changes(&usual, &elsewhere).iter().all(Option::is_none));
+}
+
+/// Friction that is higher at low velocity alone is seen along one path, where the fast part of every stroke
+/// is the same; the same arm on that path again is the same arm.
+#[test]
+fn friction_at_low_velocity_is_seen_along_one_path() {
+    let body = RigidArm::new(&lwa4p::arm().unwrap()).unwrap();
+    let plant = lwa4p::plant().unwrap();
+    let harmonics = |j: usize| {
+        let turn = j as f64;
+        Harmonics { middle: 0.0, a: vec![0.5, 0.2 * turn.cos()], b: vec![0.2 * turn.sin(), 0.3] }
+    };
+    let joints = (0..6).map(harmonics).collect();
+    let path = Fourier { fundamental: std::f64::consts::TAU / 10.0, periods: 6, ramp: 1.0, joints };
+    let side = |plant: &Plant, seed: u64| {
+        let log = plant.record(&path.sample(plant.sensors().rate), 0.0, seed).log("virtual");
+        fitted_to(&body, std::iter::once(log.clone()), seed).along(&log)
+    };
+    let usual = side(&plant, 1);
+    let slow = PlantEffect::Stribeck { joint: 2, level: 6.0, velocity: 0.08 };
+    let found = compared(&usual, &side(&plant.clone().with(slow), 2));
+    let differ: Vec<usize> = found.friction.iter().filter(|f| f.differs).map(|f| f.joint).collect();
+    assert_eq!(differ, [3], "{}", found.sentence);
+    assert!(changes(&usual.strokes, &usual.strokes)[2].is_some());
+    for seed in 3..6 {
+        let same = compared(&usual, &side(&plant, seed));
+        assert!(!same.differ, "{}", same.sentence);
+    }
 }

@@ -67,7 +67,7 @@ impl Compare {
         let files = report::compared::files(&compared).map_err(Failure::Refused)?;
         output::write_all(&files, &self.out)?;
         if self.json {
-            output::print(&files.first());
+            output::data(&files.first());
             return self.accept.judge(&compared.unusable);
         }
         output::first_lines(&compared.unusable, None, false).iter().for_each(|line| output::print(line));

@@ -180,7 +180,7 @@ impl Excite {
             write(report, page(&excited).to_html().as_bytes())?;
         }
         match self.json {
-            true => output::print(&in_json(&excited, &files).to_string()),
+            true => output::data(&in_json(&excited, &files).to_string()),
             false => output::print(in_words(&excited, &files).trim_end()),
         }
         Ok(())

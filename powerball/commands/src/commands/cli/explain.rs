@@ -145,10 +145,9 @@ impl Explain {
         let files = report::explained::files(explained).map_err(Failure::Refused)?;
         output::write_all(&files, &self.inputs.out)?;
         let (arm, out) = (&self.inputs.arm, &self.inputs.out);
-        match (self.inputs.json, verbosity) {
-            (true, _) => output::print(&files.first()),
-            (_, Verbosity { quiet: true, .. }) => {}
-            (_, Verbosity { verbose: true, .. }) => output::print(&everything(explained, arm, out)),
+        match (self.inputs.json, verbosity.verbose) {
+            (true, _) => output::data(&files.first()),
+            (_, true) => output::print(&everything(explained, arm, out)),
             _ => output::print(&summary(explained, arm, out)),
         }
         self.accept.judge(&explained.unusable)

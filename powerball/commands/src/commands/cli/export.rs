@@ -74,7 +74,7 @@ impl Export {
         output::write_file(&self.output, &bytes)?;
         if self.json {
             let what = serde_json::json!({"file": self.output, "notes": notes});
-            output::print(&output::json(&what)?);
+            output::data(&output::json(&what)?);
         } else {
             notes.iter().for_each(|note| output::print(&format!("note: {note}")));
         }

@@ -68,7 +68,10 @@ impl Generate {
         let Some(model) = known.model(&body)? else { return Ok(()) };
         let values: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
         let possibility = body.possibility(&values).map_err(|e| Failure::Refused(e.to_string()))?;
-        possibility.warnings(&self.model).iter().for_each(|warning| eprintln!("warning: {warning}"));
+        possibility
+            .warnings(&self.model)
+            .iter()
+            .for_each(|warning| output::notice(&format!("warning: {warning}")));
         let file = Arm::read(&self.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
         let scalar = match self.scalar {
             ScalarName::F32 => Scalar::F32,
@@ -110,7 +113,7 @@ impl Generate {
             let what = serde_json::json!({
                 "file": self.output, "c_header": header, "yaml": yaml, "terms": terms, "not_compensated": notes,
             });
-            output::print(&output::json(&what)?);
+            output::data(&output::json(&what)?);
         } else {
             notes.iter().for_each(|note| output::print(&format!("note: {note}")));
         }

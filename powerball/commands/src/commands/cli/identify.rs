@@ -129,8 +129,8 @@ impl Identify {
         let files = report::identified::files(&identified, known).map_err(Failure::Refused)?;
         output::write_all(&files, &self.out)?;
         if self.json {
-            output::print(&files.first());
-        } else if !verbosity.quiet {
+            output::data(&files.first());
+        } else {
             output::print(&in_words(&identified, verbosity.verbose, &self.out));
         }
         if let Some(original) = original {
@@ -223,7 +223,7 @@ impl ConsistentCommand {
         })?;
         output::write_file(&self.out, output::json(&found.parameters)?.as_bytes())?;
         if self.json {
-            output::print(&output::json(&found)?);
+            output::data(&output::json(&found)?);
             return Ok(());
         }
         for reason in &found.reasons {

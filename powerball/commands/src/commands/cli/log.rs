@@ -73,7 +73,7 @@ impl LogCommand {
         }
         let refused: Vec<String> = files.iter().flat_map(|file| file.refused.clone()).collect();
         if self.json {
-            output::print(&output::json(&Written { files })?);
+            output::data(&output::json(&Written { files })?);
         } else {
             files.iter().for_each(|file| output::print(&text(file)));
         }

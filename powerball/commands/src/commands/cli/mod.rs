@@ -181,6 +181,9 @@ pub fn main() -> ExitCode {
     if cli.force {
         replace::replace_all();
     }
+    if cli.verbosity.quiet {
+        output::be_quiet();
+    }
     match cli.run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

@@ -9,7 +9,21 @@ use powerball_identification::estimate::ResidualStats;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+
+/// Whether `--quiet` was given to this process.
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// Switches [`print`] and [`notice`] off.
+pub(super) fn be_quiet() {
+    QUIET.store(true, Ordering::Relaxed);
+}
+
+/// Whether [`print`] and [`notice`] are switched off.
+pub(crate) fn is_quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
+}
 
 /// The target of events whose words stand on standard error anyhow: how far a computation has come, and how
 /// it ended.
@@ -50,7 +64,7 @@ fn processor() -> Duration {
 
 impl Progress {
     pub(crate) fn new() -> Progress {
-        Progress { shown: std::io::stderr().is_terminal(), phases: None }
+        Progress { shown: std::io::stderr().is_terminal() && !is_quiet(), phases: None }
     }
 
     /// As [`Self::new`], with times by phase on standard error when it ends.
@@ -144,7 +158,7 @@ pub(crate) struct Verbosity {
     /// Print more: what is done with the arm, on standard error, and every note and all evidence of a result.
     #[arg(short, long, global = true, conflicts_with = "quiet")]
     pub verbose: bool,
-    /// Print nothing but errors.
+    /// Print nothing but errors and what --json, --word or --timings asks for: the exit code is the answer.
     #[arg(short, long, global = true)]
     pub quiet: bool,
 }
@@ -189,9 +203,23 @@ pub(crate) fn first_lines(unusable: &[String], columns: Option<&Conventions>, al
     lines.into_iter().flatten().collect()
 }
 
-/// Prints to standard output; a closed pipe is no error.
+/// Prints words for people on standard output, unless the command is quiet.
 pub(crate) fn print(text: &str) {
+    if !is_quiet() {
+        data(text);
+    }
+}
+
+/// Prints on standard output what another program reads; a closed pipe is no error.
+pub(crate) fn data(text: &str) {
     let _ = writeln!(std::io::stdout(), "{text}");
+}
+
+/// Prints words for people on standard error, unless the command is quiet.
+pub(crate) fn notice(text: &str) {
+    if !is_quiet() {
+        eprintln!("{text}");
+    }
 }
 
 /// The foot of a page: time (UTC), version and command.

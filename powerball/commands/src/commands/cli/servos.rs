@@ -50,8 +50,8 @@ impl Asked<'_> {
     ) -> Result<(), Failure> {
         output::write_all(files, self.out)?;
         if self.json {
-            output::print(&files.first());
-        } else if !verbosity.quiet {
+            output::data(&files.first());
+        } else {
             let verbose = verbosity.verbose;
             let mut lines = output::first_lines(unusable, None, verbose);
             if verbose {

@@ -18,7 +18,7 @@ impl Completions {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut Cli::command(), "powerball", &mut script);
-        output::print(String::from_utf8_lossy(&script).trim_end());
+        output::data(String::from_utf8_lossy(&script).trim_end());
         Ok(())
     }
 }

@@ -95,7 +95,7 @@ impl Summarize {
             warnings,
         };
         if self.json {
-            output::print(&output::json(&written)?);
+            output::data(&output::json(&written)?);
             return self.accept.judge(&written.unusable);
         }
         output::first_lines(&written.unusable, None, false).iter().for_each(|line| output::print(line));

@@ -59,7 +59,7 @@ impl Verify {
         let files = report::verified::files(&verified).map_err(Failure::Refused)?;
         output::write_all(&files, &self.inputs.out)?;
         if self.inputs.json {
-            output::print(&files.first());
+            output::data(&files.first());
         } else {
             output::first_lines(&verified.unusable, None, false).iter().for_each(|line| output::print(line));
             for (j, band) in verified.joints.iter().zip(&verified.joint_bands) {

@@ -83,7 +83,7 @@ impl DemoCommand {
                 "fit_logs": session.fit, "held_out_logs": session.held_out, "arm": session.arm_file,
                 "report": self.out.join("report.html"), "seconds": seconds,
             });
-            output::print(&result.to_string());
+            output::data(&result.to_string());
         } else {
             output::print(&self.in_words(&demo, seconds));
         }

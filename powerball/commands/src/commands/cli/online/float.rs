@@ -98,7 +98,7 @@ impl FloatCommand {
             "drift_time": rest.len() as f64 * period, "hand": hand, "plant": self.on.plant(),
         });
         match self.on.place.json {
-            true => output::print(&result.to_string()),
+            true => output::data(&result.to_string()),
             false => said(&result),
         }
         Ok(())

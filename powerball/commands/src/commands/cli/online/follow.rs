@@ -287,7 +287,7 @@ impl FollowCommand {
         let files = followed::files(&result, path, tracks).map_err(Failure::Refused)?;
         output::write_all(&files, &self.out)?;
         if self.on.place.json {
-            output::print(&files.first());
+            output::data(&files.first());
         } else {
             Self::in_words(&result, tracks);
         }

@@ -90,7 +90,7 @@ impl Friction {
             page(&model.arm().name, &found, &notes).to_html().as_bytes(),
         )?;
         match self.place.json {
-            true => output::print(&text),
+            true => output::data(&text),
             false => print(&found, &notes),
         }
         Ok(())

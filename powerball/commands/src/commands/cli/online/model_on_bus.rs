@@ -1,9 +1,9 @@
 //! The arm with a torque model, and its bus, for `follow` and `float`.
 
-use super::Failure;
 use super::bus::{Consent, Where, virtual_bus};
 use super::envelope::Surroundings;
 use super::virtual_arm::{built, setup};
+use super::{Failure, output};
 use crate::commands::model_arm::{self, ModelArm};
 use crate::procedure::{Envelope, RecordError};
 use clap::Args;
@@ -84,13 +84,12 @@ impl ModelOnBus {
 
     fn virtual_arm(&self, start: [f64; 6], hand: Option<Hand>) -> Result<VirtualArm, Failure> {
         let file = self.plant_file();
-        match &file {
-            Some(file) => eprintln!("powerball: the virtual arm is that of {}", file.display()),
-            None => eprintln!(
-                "powerball: the virtual arm is the built-in one, which has no undeclared effect: it cannot \
-                    test a model of another arm; give the file of that arm with --plant"
-            ),
-        }
+        output::notice(&match &file {
+            Some(file) => format!("powerball: the virtual arm is that of {}", file.display()),
+            None => "powerball: the virtual arm is the built-in one, which has no undeclared effect: it \
+                cannot test a model of another arm; give the file of that arm with --plant"
+                .to_string(),
+        });
         let setup = match &file {
             Some(file) => Undeclared::read(file)
                 .map_err(Failure::Unusable)?

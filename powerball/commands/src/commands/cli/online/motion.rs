@@ -2,7 +2,8 @@
 
 use super::{Failure, output};
 use crate::procedure::MotionLog;
-use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
+use crate::report::Page;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 use std::path::Path;
 
 /// A line on standard error, where a person looks at it, that is written over by the next one and cut at the
@@ -12,12 +13,19 @@ pub(super) fn live<T: std::fmt::Display>() -> impl FnMut(&T) {
         ProgressStyle::with_template("  {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner()),
     );
     let line = line.with_finish(ProgressFinish::AndLeave);
+    if output::is_quiet() {
+        line.set_draw_target(ProgressDrawTarget::hidden());
+    }
     move |what| line.set_message(what.to_string())
 }
 
-/// Begins the log of a motion in a folder for results.
+/// Begins the log of a motion in a folder for results, with a page that stays where the run is stopped: by it
+/// the same command knows the folder as its own next time.
 pub(super) fn motion_log(folder: &Path) -> Result<MotionLog, Failure> {
     output::make_own_folder(folder, &["log.csv"])?;
+    let mut page = Page::new("Log of a motion");
+    page.paragraph("log.csv has every cycle of this run, up to its end or to where it was stopped.");
+    output::write(folder, "report.html", page.to_html().as_bytes())?;
     let file = folder.join("log.csv");
     MotionLog::create(&file)
         .map_err(|e| Failure::Unusable(format!("{}: cannot be written: {e}", file.display())))

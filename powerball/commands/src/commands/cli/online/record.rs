@@ -80,7 +80,7 @@ impl RecordCommand {
         })?;
         closed.map_err(unwritable)?;
         if self.place.json {
-            output::print(&json!({ "out": self.out, "record": done }).to_string());
+            output::data(&json!({ "out": self.out, "record": done }).to_string());
         } else {
             let far = done.following_max.iter().fold(0.0f64, |far, e| far.max(*e));
             output::print(&format!(

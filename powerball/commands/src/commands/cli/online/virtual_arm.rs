@@ -65,7 +65,7 @@ impl VirtualArmCommand {
         let mut arm = self.arm()?;
         let mut bus = transport::open(&self.bus).map_err(|e| Failure::Unusable(e.to_string()))?;
         let nodes: Vec<u8> = arm.nodes().iter().map(|node| node.id().raw()).collect();
-        eprintln!("powerball: the virtual arm is on {}, nodes {nodes:?}", self.bus);
+        output::notice(&format!("powerball: the virtual arm is on {}, nodes {nodes:?}", self.bus));
         let started = Instant::now();
         let length = self.seconds.map(Duration::from_secs_f64);
         let stop = || length.is_some_and(|length| started.elapsed() >= length);
@@ -79,7 +79,7 @@ impl VirtualArmCommand {
                 "bus": self.bus.to_string(), "nodes": nodes, "seconds": started.elapsed().as_secs_f64(),
                 "position": arm.simulation().links(),
             });
-            output::print(&result.to_string());
+            output::data(&result.to_string());
         }
         Ok(())
     }

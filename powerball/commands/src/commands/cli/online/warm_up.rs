@@ -95,7 +95,7 @@ impl WarmUp {
         output::write(&self.out, "warm_up.json", text.as_bytes())?;
         output::write(&self.out, "report.html", page(&warmth).to_html().as_bytes())?;
         match self.place.json {
-            true => output::print(&text),
+            true => output::data(&text),
             false => print(&warmth),
         }
         if warmth.warm {

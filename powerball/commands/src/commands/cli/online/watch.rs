@@ -28,7 +28,7 @@ use std::path::PathBuf;
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  \
     powerball watch --arm arm.toml --model result/model.json --log today.csv --json\n  \
-    ros2_to_csv | powerball watch --arm arm.toml --model result/model.json -\n\n\
+    ros2_to_csv | powerball watch --arm arm.toml --model result/model.json --log -\n\n\
     With - rows are read from standard input as they come: CSV with a header line, or an object with the \
     same\n\
     keys on each line ({\"t\": 0.005, \"q1\": …, \"tau1\": …} or {\"t\": 0.005, \"q\": […], \"tau\": […]}).")]
@@ -40,8 +40,9 @@ pub(crate) struct WatchCommand {
     /// model.json of `powerball explain`, or identified.json, for the same arm file.
     #[arg(long, value_name = "FILE.json")]
     model: PathBuf,
-    /// Logs, each watched on its own (CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5).
-    #[arg(long, value_name = "FILE", num_args = 1..)]
+    /// Logs, each watched on its own (CSV, Parquet, MCAP, a bag of ROS, npz, mat or HDF5); - is standard
+    /// input.
+    #[arg(long, value_name = "FILE|-", num_args = 1..)]
     log: Vec<PathBuf>,
     /// A bus on which another master moves the LWA 4P: socketcan:can0, slcan:/dev/ttyACM0 or
     /// udp:239.74.163.2:43113. Nothing is sent.
@@ -52,7 +53,7 @@ pub(crate) struct WatchCommand {
     seconds: Option<f64>,
     #[command(flatten)]
     serve: Serve,
-    /// Rows from standard input.
+    /// Rows from standard input, as --log -.
     #[arg(value_name = "-", value_parser = ["-"])]
     stream: Option<String>,
     #[command(flatten)]
@@ -93,10 +94,13 @@ fn share(text: &str) -> Result<f64, String> {
 }
 
 impl WatchCommand {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(mut self) -> Result<(), Failure> {
         if self.seconds.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
             return Err(Failure::Unusable("--for needs a number of seconds above 0".to_string()));
         }
+        let files = self.log.len();
+        self.log.retain(|file| file.as_os_str() != "-");
+        let streams = self.stream.is_some() || self.log.len() < files;
         let map = self.map.read()?;
         let said = Arm::read(&self.arm).map_err(|e| Failure::Unusable(e.to_string()))?;
         let known = Known::read(&self.arm, Some(&self.model))?;
@@ -120,7 +124,7 @@ impl WatchCommand {
         for log in &logs {
             seen.add(self.watch_log(log, &body, &model, &options, &live));
         }
-        if self.stream.is_some() {
+        if streams {
             seen.add(self.watch_stream(&said, &map, (&body, &model, &options), &live)?);
         }
         if let Some(bus) = &self.bus {
@@ -153,6 +157,9 @@ impl WatchCommand {
                 seen.seconds
             )));
         }
+        if !seen.unjudged.is_empty() && seen.events == 0 {
+            return Err(Failure::Doubtful(seen.unjudged.join("; ")));
+        }
         let of = format!("{:.0} s, joint {joints}", seen.seconds);
         let line = match seen.events {
             0 => format!("holds: {of}"),
@@ -160,7 +167,7 @@ impl WatchCommand {
             several => format!("changed: {several} events in {of}"),
         };
         match self.json || self.word {
-            true => eprintln!("{line}"),
+            true => output::notice(&line),
             false => output::print(&line),
         }
         if seen.events == 0 || self.exit_zero { Ok(()) } else { Err(Failure::Negative) }
@@ -199,14 +206,15 @@ impl WatchCommand {
         for sample in log.samples() {
             self.take(&mut watch, &sample, &mut seen, live);
         }
-        self.finish(&mut watch, &mut seen, live);
+        self.finish(&mut watch, &log.file, &mut seen, live);
         seen
     }
 
-    fn finish(&self, watch: &mut Watch<'_>, seen: &mut Seen, live: &Live) {
+    fn finish(&self, watch: &mut Watch<'_>, name: &str, seen: &mut Seen, live: &Live) {
         let events = watch.finish();
         self.say(watch, &events, seen, live);
         seen.joints = watch.watched();
+        seen.unjudged.extend(watch.unjudged().map(|why| format!("{name}: {why}")));
     }
 
     /// An arm that another master drives, until Ctrl-C or as long as --for says.
@@ -225,7 +233,7 @@ impl WatchCommand {
         let name = bus.to_string();
         let (mut watch, mut seen) = (Watch::new(body, model, options, &name), Seen::default());
         listen(bus, self.seconds, |sample| self.take(&mut watch, sample, &mut seen, live))?;
-        self.finish(&mut watch, &mut seen, live);
+        self.finish(&mut watch, &name, &mut seen, live);
         Ok(seen)
     }
 
@@ -285,7 +293,7 @@ impl WatchCommand {
                 "{NAME}: {usable} usable samples are too few: at least {FIRST} are needed"
             )));
         }
-        self.finish(&mut watch, &mut seen, live);
+        self.finish(&mut watch, NAME, &mut seen, live);
         Ok(seen)
     }
 
@@ -294,13 +302,14 @@ impl WatchCommand {
         seen.events += events.len();
         watch.notes().iter().for_each(|note| tracing::warn!("{note}"));
         for event in events {
-            live.event(&event.sentence());
+            let sentence = event.sentence(watch.arm());
+            live.event(&sentence);
             match (self.json, self.word) {
-                (true, _) => output::print(&serde_json::to_string(event).unwrap_or_default()),
+                (true, _) => output::data(&serde_json::to_string(event).unwrap_or_default()),
                 // The end of a push is no new one.
                 (_, true) if event.evidence.ends => {}
-                (_, true) => output::print(word(&event.what)),
-                _ => output::print(&event.sentence()),
+                (_, true) => output::data(word(&event.what)),
+                _ => output::print(&sentence),
             }
         }
     }
@@ -347,6 +356,8 @@ struct Seen {
     last: Option<f64>,
     events: usize,
     joints: Vec<JointNumber>,
+    /// By log with too little motion: its name and how much is needed.
+    unjudged: Vec<String>,
 }
 
 impl Seen {
@@ -363,6 +374,7 @@ impl Seen {
         self.stale += other.stale;
         self.seconds += other.seconds;
         self.events += other.events;
+        self.unjudged.extend(other.unjudged);
         self.joints.extend(other.joints);
         self.joints.sort_unstable();
         self.joints.dedup();

@@ -98,7 +98,7 @@ impl Enable {
         master.wait_for(Phase::Ready, PATIENCE).map_err(arm)?;
         master.driver_mut().enable().map_err(refused)?;
         master.wait_for(Phase::Running, PATIENCE).map_err(arm)?;
-        eprintln!("powerball: enabled; holding for {} s", self.hold);
+        output::notice(&format!("powerball: enabled; holding for {} s", self.hold));
         let held = master.driver().positions();
         let until = master.bus().now() + hold.as_micros() as u64;
         while master.bus().now() < until {
@@ -114,7 +114,7 @@ impl Enable {
                 "bus": self.place.bus.to_string(), "position": position, "torque": torque, "seconds": self.hold,
                 "cycles": master.driver().counters().cycles, "late": master.driver().counters().late,
             });
-            output::print(&result.to_string());
+            output::data(&result.to_string());
         } else {
             output::print(&format!("held for {} s at {}; brakes closed", self.hold, list(&position)));
         }
@@ -196,7 +196,7 @@ impl Stop {
             let result = json!({
                 "bus": self.place.bus.to_string(), "stopped": stopped, "silent": failed, "states": states,
             });
-            output::print(&result.to_string());
+            output::data(&result.to_string());
         } else {
             let states: Vec<String> =
                 states.iter().map(|(node, state)| format!("node {node}: {state}")).collect();
@@ -256,7 +256,7 @@ impl Move {
                 "bus": self.place.bus.to_string(), "joint": self.joint, "from": from[index], "to": to[index],
                 "at": at[index], "position": at, "late": master.driver().counters().late,
             });
-            output::print(&result.to_string());
+            output::data(&result.to_string());
         } else {
             let clock = if self.place.bus == BusUrl::Virtual { " (virtual)" } else { "" };
             output::print(&format!(

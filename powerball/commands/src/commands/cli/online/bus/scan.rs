@@ -55,7 +55,7 @@ impl Scan {
             let nodes: Vec<_> = found.iter().map(|(id, node)| node.in_json(*id)).collect();
             let twice: Vec<u8> = found.iter().filter(|(_, node)| node.twice).map(|(id, _)| *id).collect();
             let result = json!({ "bus": self.place.bus.to_string(), "nodes": nodes, "used_twice": twice });
-            output::print(&result.to_string());
+            output::data(&result.to_string());
         } else {
             output::print(in_words(&found).trim_end());
         }

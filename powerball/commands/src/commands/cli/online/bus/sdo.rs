@@ -184,7 +184,7 @@ fn show(address: &Address, value: &Value, place: &Where) {
             "node": address.node.raw(), "index": address.object.index, "sub": address.object.sub, "value": meaning,
             "bytes": hex, "name": entry.map(|e| e.name),
         });
-        output::print(&result.to_string());
+        output::data(&result.to_string());
     } else {
         let text = meaning.as_str().map_or(meaning.to_string(), ToString::to_string);
         let name = entry.map_or(String::new(), |e| format!("  {}", e.name));

@@ -144,9 +144,10 @@ impl Show {
         let mut bus = self.what.place.open()?;
         let (rows, silent) = self.what.ask(&mut *bus);
         let json = self.what.place.json;
-        output::print(
-            if json { self.what.in_json(&rows, &silent) } else { in_words(&rows, &silent) }.trim_end(),
-        );
+        match json {
+            true => output::data(self.what.in_json(&rows, &silent).trim_end()),
+            false => output::print(in_words(&rows, &silent).trim_end()),
+        }
         if rows.is_empty() {
             return Err(Failure::Refused(format!("no drive answers on {}", self.what.place.bus)));
         }
@@ -165,7 +166,7 @@ impl Watch {
         let mut bus = self.what.place.open()?;
         let period = Duration::from_secs_f64(self.every);
         let tables = self.seconds.map_or(u64::MAX, |s| (s / self.every).ceil().max(1.0) as u64);
-        let redraw = std::io::stdout().is_terminal() && !self.what.place.json;
+        let redraw = std::io::stdout().is_terminal() && !self.what.place.json && !output::is_quiet();
         for k in 0..tables {
             let (rows, silent) = self.what.ask(&mut *bus);
             if redraw && k > 0 {
@@ -173,9 +174,10 @@ impl Watch {
                 print!("\x1b[{}A\x1b[J", self.what.nodes().len() + 1);
             }
             let json = self.what.place.json;
-            output::print(
-                if json { self.what.in_json(&rows, &silent) } else { in_words(&rows, &silent) }.trim_end(),
-            );
+            match json {
+                true => output::data(self.what.in_json(&rows, &silent).trim_end()),
+                false => output::print(in_words(&rows, &silent).trim_end()),
+            }
             if self.what.place.bus == BusUrl::Virtual {
                 // A clock of its own: the person's passes too.
                 std::thread::sleep(period);

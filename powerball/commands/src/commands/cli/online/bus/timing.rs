@@ -119,7 +119,7 @@ impl Timing {
                 "bus": self.place.bus.to_string(), "sync_interval": cycles.in_json(), "sync_to_data": data.in_json(),
                 "sdo": trips.in_json(), "missing": missing, "late": counters.late, "skipped": counters.skipped,
             });
-            output::print(&result.to_string());
+            output::data(&result.to_string());
         } else {
             let clock =
                 if self.place.bus == BusUrl::Virtual { "time to compute a cycle" } else { "SYNC to SYNC" };
