@@ -201,12 +201,7 @@ fn table_lines(table: &InspectedTable, lines: &mut Vec<String>) {
 
 /// Writes a log; with a model as MCAP that has measured, predicted and residual torque next to each other.
 pub(super) fn write(log: &Log, arm: &Arm, model: Option<&Path>, out: &Path) -> Result<(), Failure> {
-    replace::check_log(out)?;
-    for layout in ["foxglove.json", "plotjuggler.xml"] {
-        if out.extension().is_some_and(|kind| kind == "mcap") {
-            replace::check_log(&out.with_extension(layout))?;
-        }
-    }
+    replace::check_log(out, &[Path::new(&log.file)])?;
     let failed = |e: std::io::Error| Failure::Unusable(format!("{}: cannot be written: {e}", out.display()));
     match model {
         None => log.write_for(out, &joint_names(arm)).map_err(failed),

@@ -123,11 +123,20 @@ pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
 }
 
 /// As [`make_folder`], for a command whose results are many files: refused where one of these names is there
-/// and no page of this command.
+/// and no page of this command. A first page is written, by which the command knows the folder as its own
+/// after it was stopped.
 #[cfg(feature = "cli")]
-pub(crate) fn make_own_folder(folder: &Path, names: &[&str]) -> Result<(), Failure> {
+pub(crate) fn make_own_folder(
+    folder: &Path,
+    names: &[&str],
+    title: &str,
+    words: &str,
+) -> Result<(), Failure> {
     replace::check_own_folder(folder, names)?;
-    make_folder(folder)
+    make_folder(folder)?;
+    let mut page = crate::report::Page::new(title);
+    page.paragraph(words);
+    write(folder, "report.html", page.to_html().as_bytes())
 }
 
 /// Writes a file of a folder whole or not at all: a reader never sees half of it.

@@ -1,9 +1,8 @@
-//! Which files a command may replace: those that the same command made, and others with `--force`. A file
-//! that the command line names as an input is never replaced.
+//! Which files a command may replace: those that the same command made, and others with `--force`.
 //!
-//! A page names in its foot the command that made it; a JSON object is recognised by the keys of its result,
-//! any other text by its first line, which is its header. A log is never recognised: it may be the only one
-//! of its kind.
+//! A page names in its head or its foot the program that made it; a JSON object is recognised by the keys of
+//! its result, any other text by its first line, which is its header. A log is never recognised: it may be the
+//! only one of its kind.
 
 use super::{Cli, Failure};
 use clap::CommandFactory;
@@ -64,54 +63,43 @@ pub(super) fn check_own_folder(folder: &Path, names: &[&str]) -> Result<(), Fail
 /// Refuses to replace a file that is not of the kind of `new`; without it by its name alone.
 pub(super) fn check(target: &Path, new: Option<&[u8]>) -> Result<(), Failure> {
     // A pipe or a terminal holds nothing that could be lost.
-    if !target.is_file() {
-        return Ok(());
-    }
-    check_input(target)?;
-    if FORCE.load(Ordering::Relaxed) {
+    if FORCE.load(Ordering::Relaxed) || !target.is_file() {
         return Ok(());
     }
     // A file that cannot be read gives an error when it is written.
     let Ok(old) = std::fs::read(target) else { return Ok(()) };
-    match old.is_empty() || is_alike(target, &old, new, own().as_deref()) {
+    match old.is_empty() || is_alike(target, &old, new) {
         true => Ok(()),
         false => Err(refused(target)),
     }
 }
 
-/// Refuses to replace any file by a log.
-pub(super) fn check_log(target: &Path) -> Result<(), Failure> {
-    check_input(target)?;
-    match target.is_file() && !FORCE.load(Ordering::Relaxed) {
-        true => Err(refused(target)),
-        false => Ok(()),
+/// What the names of the layouts next to an MCAP end with.
+const LAYOUTS: [&str; 2] = ["foxglove.json", "plotjuggler.xml"];
+
+/// Refuses to replace any file by a log or by the layouts next to an MCAP, and always those that it is made
+/// of.
+pub(super) fn check_log(target: &Path, inputs: &[&Path]) -> Result<(), Failure> {
+    check_inputs(target, inputs)?;
+    let is_mcap = target.extension().is_some_and(|kind| kind.eq_ignore_ascii_case("mcap"));
+    let layouts = LAYOUTS.iter().filter(|_| is_mcap).map(|kind| target.with_extension(kind));
+    for file in std::iter::once(target.to_path_buf()).chain(layouts) {
+        if file.is_file() && !FORCE.load(Ordering::Relaxed) {
+            return Err(refused(&file));
+        }
     }
+    Ok(())
 }
 
-/// Options after which a file of the command line is no input.
-const OUTPUTS: [&str; 6] = ["-o", "--output", "--out", "--report", "--yaml", "--c-header"];
-
-/// Refuses a file that the command line names as an input, also with `--force`.
-fn check_input(target: &Path) -> Result<(), Failure> {
-    let words: Vec<String> = std::env::args().collect();
-    let Ok(target_path) = target.canonicalize() else { return Ok(()) };
-    let is_target = |word: &str| Path::new(word).canonicalize().is_ok_and(|path| path == target_path);
-    let input = words.windows(2).any(|pair| {
-        let value = pair[1].strip_prefix("--").and_then(|option| option.split_once('='));
-        match value {
-            Some((option, value)) => {
-                !OUTPUTS.iter().any(|o| o.strip_prefix("--") == Some(option)) && is_target(value)
-            }
-            None => !OUTPUTS.contains(&pair[0].as_str()) && is_target(&pair[1]),
-        }
-    });
-    match input {
-        true => {
-            let reason = format!("{}: is also an input: choose another file", target.display());
-            Err(Failure::Unusable(reason))
-        }
-        false => Ok(()),
+/// Refuses to write over an input, also with `--force`.
+pub(super) fn check_inputs(target: &Path, inputs: &[&Path]) -> Result<(), Failure> {
+    let same =
+        |input: &&Path| matches!((input.canonicalize(), target.canonicalize()), (Ok(a), Ok(b)) if a == b);
+    if inputs.iter().any(same) {
+        let reason = format!("{}: is also an input: choose another file", target.display());
+        return Err(Failure::Unusable(reason));
     }
+    Ok(())
 }
 
 fn refused(target: &Path) -> Failure {
@@ -145,14 +133,15 @@ fn is_own_layout(object: &serde_json::Map<String, Value>, text: &[u8]) -> bool {
     crate::report::files::json(object).is_ok_and(|own| own.as_bytes() == text)
 }
 
-fn is_alike(target: &Path, old: &[u8], new: Option<&[u8]>, own_command: Option<&str>) -> bool {
+fn is_alike(target: &Path, old: &[u8], new: Option<&[u8]>) -> bool {
     let name = target.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let object = |bytes: &[u8]| match serde_json::from_slice(bytes) {
         Ok(Value::Object(object)) => Some(object),
         _ => None,
     };
     if name.ends_with(".html") {
-        return is_page_of(own_command, old);
+        let page = String::from_utf8_lossy(old);
+        return page.contains(crate::report::MADE_BY) || page.contains(" UTC, powerball ");
     }
     if let Some(own) = object(old) {
         let flat = |object: &serde_json::Map<String, Value>| object.values().all(Value::is_number);
@@ -182,13 +171,10 @@ mod tests {
 
     #[test]
     fn a_file_is_replaced_by_one_of_its_kind() {
-        let page = |by: &str| format!("<!doctype html><footer>1 UTC, powerball 0.1.0: {by} --out x</footer>");
-        let identify = page("powerball --quiet identify");
-        let compare = page("powerball compare");
+        let page = format!("<!doctype html>{}<title>x</title>", crate::report::MADE_BY);
         let values = "{\n  \"m1\": 1.5,\n  \"m2\": 1.0\n}";
         for (name, old, new, alike) in [
-            ("report.html", identify.as_str(), "", true),
-            ("report.html", compare.as_str(), "", false),
+            ("report.html", page.as_str(), "", true),
             ("report.html", "<!doctype html><title>my report</title>", "", false),
             ("identified.json", "{\"friction\": []}", "", true),
             ("identified.json", "{\"notes\": 1}", "", false),
@@ -210,7 +196,7 @@ mod tests {
             ("a.sdf", "<?xml?>", "<?xml?><!-- written by powerball export, 2 -->", false),
         ] {
             assert_eq!(
-                is_alike(Path::new(name), old.as_bytes(), Some(new.as_bytes()), Some("identify")),
+                is_alike(Path::new(name), old.as_bytes(), Some(new.as_bytes())),
                 alike,
                 "{name}: {old}"
             );

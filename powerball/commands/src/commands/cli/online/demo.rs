@@ -4,13 +4,14 @@ use super::Failure;
 use super::output::{self, Progress};
 use crate::commands::demo::{self, Demo, DemoError, SessionError};
 use clap::Args;
+use powerball_explanation::experiment::TRAJECTORY;
 use powerball_logs as logs;
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
 /// What the names of the files begin with that the command writes.
-const FILES: [&str; 10] = [
+const FILES: [&str; 11] = [
     "arm.toml",
     "virtual_arm.json",
     "base.json",
@@ -21,6 +22,7 @@ const FILES: [&str; 10] = [
     "model.json",
     "explained.json",
     "follow.json",
+    TRAJECTORY,
 ];
 
 /// Record a virtual arm with an effect that the model does not know about, identify, explain, and compare
@@ -54,7 +56,8 @@ pub(crate) struct DemoCommand {
 impl DemoCommand {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let progress = Progress::new();
-        output::make_own_folder(&self.out, &FILES)?;
+        let words = "The demonstration was stopped, or is running: its report takes the place of this page.";
+        output::make_own_folder(&self.out, &FILES, "Demonstration", words)?;
         let started = std::time::Instant::now();
         let demo = demo::run(
             &self.out,

@@ -63,6 +63,8 @@ impl Experiment {
         if !self.experiment {
             return Ok(None);
         }
+        let read: Vec<&Path> = inputs.log.iter().map(PathBuf::as_path).collect();
+        replace::check_inputs(&inputs.out.join(LOG), &read)?;
         replace::check_own_folder(&inputs.out, &[LOG])?;
         let place = Where { bus: self.bus.clone(), json: inputs.json };
         let (bus, note) = self.arm(&inputs.arm, &place)?;

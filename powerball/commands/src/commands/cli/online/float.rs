@@ -114,6 +114,8 @@ impl FloatCommand {
         seconds: Option<f64>,
     ) -> Result<Vec<SVector<f64, 6>>, Failure> {
         let refused = |e: crate::procedure::RecordError| Failure::Refused(e.to_string());
+        // Before a motor is switched on: a folder of others ends the command.
+        let mut log = self.out.as_deref().map(|out| motion::motion_log(out, &[])).transpose()?;
         let master = self.on.master(LWA4P, start, hand)?;
         // In interpolated position mode the motors find their commutation while their drives hold the arm.
         let master = Recorder::enable(master, envelope).and_then(Recorder::finish).map_err(refused)?;
@@ -130,7 +132,6 @@ impl FloatCommand {
         live.start("an arm guided by hand", &[("position", "rad"), ("velocity", "rad/s"), ("torque", "N·m")]);
         let most = seconds.map(|s| (s / LWA4P.period_seconds()) as usize);
         let mut positions = Vec::new();
-        let mut log = self.out.as_deref().map(motion::motion_log).transpose()?;
         arm.run(log.as_mut(), |measured| {
             if most.is_some_and(|most| positions.len() >= most) {
                 return None;

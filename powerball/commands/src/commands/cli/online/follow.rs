@@ -145,7 +145,7 @@ impl FollowCommand {
         let live = self.serve.open()?;
         let (mut shown, mut seconds) = (0, 0.0);
 
-        let mut log = motion::motion_log(&self.out)?;
+        let mut log = motion::motion_log(&self.out, &[&self.trajectory])?;
         let mut master = self.on.master(profile, [0.0; 6], None)?;
         let terminal = output::Progress::new();
         let mut tracks: Vec<(&str, Track<6>)> = Vec::new();

@@ -1,8 +1,7 @@
 //! What a motion shows and writes while it lasts.
 
-use super::{Failure, output};
+use super::{Failure, output, replace};
 use crate::procedure::MotionLog;
-use crate::report::Page;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 use std::path::Path;
 
@@ -19,14 +18,15 @@ pub(super) fn live<T: std::fmt::Display>() -> impl FnMut(&T) {
     move |what| line.set_message(what.to_string())
 }
 
-/// Begins the log of a motion in a folder for results, with a page that stays where the run is stopped: by it
-/// the same command knows the folder as its own next time.
-pub(super) fn motion_log(folder: &Path) -> Result<MotionLog, Failure> {
-    output::make_own_folder(folder, &["log.csv"])?;
-    let mut page = Page::new("Log of a motion");
-    page.paragraph("log.csv has every cycle of this run, up to its end or to where it was stopped.");
-    output::write(folder, "report.html", page.to_html().as_bytes())?;
-    let file = folder.join("log.csv");
+/// The file of a motion's log, in the folder of the results.
+const LOG: &str = "log.csv";
+
+/// Begins the log of a motion in a folder for results; no input is written over.
+pub(super) fn motion_log(folder: &Path, inputs: &[&Path]) -> Result<MotionLog, Failure> {
+    let file = folder.join(LOG);
+    replace::check_inputs(&file, inputs)?;
+    let words = "log.csv has every cycle of this run, up to its end or to where it was stopped.";
+    output::make_own_folder(folder, &[LOG], "Log of a motion", words)?;
     MotionLog::create(&file)
         .map_err(|e| Failure::Unusable(format!("{}: cannot be written: {e}", file.display())))
 }

@@ -57,7 +57,7 @@ impl RecordCommand {
             .map_err(|e| Failure::Unusable(format!("{name}: cannot be read: {e}")))?;
         let motion = Motion::from_csv(&text, LWA4P.joints.len())
             .map_err(|why| Failure::Unusable(format!("{name}: {why}")))?;
-        replace::check_log(&self.out)?;
+        replace::check_log(&self.out, &[&self.trajectory])?;
         let arm = self.surroundings.arm()?;
         let envelope = self.surroundings.envelope(&arm, &self.mounting)?;
         let master = master(&self.place, self.consent)?;
