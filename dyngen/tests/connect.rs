@@ -251,6 +251,14 @@ fn bars_without_a_place_are_refused() {
     assert!(refusal(&open).contains(words), "{}", refusal(&open));
     let longer = CRANK.replacen("pos=\"-0.25 0.05 0\"", "pos=\"-0.35 0.05 0\"", 1);
     assert!(refusal(&longer).contains("bar 'rod': its pin lies 100.000 mm from"), "{}", refusal(&longer));
+    let linkage = imported(LINKAGE, "hand");
+    let written = |text: &str| exported(text, &linkage.arm, linkage.values.clone());
+    assert_eq!(imported(&written(LINKAGE).unwrap(), "hand").arm, linkage.arm);
+    // The same pins on links, another middle pin.
+    let bent =
+        LINKAGE.replacen("pos=\"-0.22 0.05", "pos=\"-0.2 0.05", 1).replacen("\"-0.18 0", "\"-0.2 0", 1);
+    let refusal_of = written(&bent).unwrap_err();
+    assert!(refusal_of.contains("its loop has other lengths"), "{refusal_of}");
     let known = export::Known::read(&before.arm, (&before.values_json(), "v.json"), None).unwrap();
     for write in [export::sdf, export::usd] {
         let refusal = write(&before.arm, &known, "a test", &[]).unwrap_err();

@@ -144,6 +144,48 @@ middle = "left"
     }
 }
 
+/// The joint that moves on its own has the limits that count, and a loop has them with its dead points.
+#[test]
+fn a_loop_closes_within_the_limits_of_the_joint_that_moves() {
+    let read = |leader: &str, follower: &str, lengths: &str| {
+        let text = format!(
+            r#"
+name = "tied"
+convention = "modified"
+gravity = [0, 0, -9.81]
+joint = [
+    {{ kind = "revolute", a = 0, alpha = 0, d = 0, theta = 0 {leader} }},
+    {{ kind = "revolute", a = 0.2, alpha = 0, d = 0, theta = 0 {follower} }},
+]
+[[loop]]
+joints = [2, "a", "b", "c"]
+lengths = {lengths}
+inner = 0
+outer = 0
+middle = "left"
+"#
+        );
+        Arm::parse(&text, "arm.toml").map_err(|e| e.to_string())
+    };
+    let follows = ", mimic = { joint = 1, ratio = -2, offset = 1 }";
+    let limited = format!("{follows}, position = [-0.5, 0.5]");
+    let lengths = "[0.25, 0.9, 0.4, 1.1]";
+    // The loop closes between -2.43 and 2.43 rad.
+    for (leader, follower) in [(", position = [-0.7, 1.7]", follows), (", position = [-0.7, 1.7]", &limited)]
+    {
+        read(leader, follower, lengths).unwrap();
+    }
+    for leader in ["", ", position = [-0.8, 1.7]"] {
+        let error = read(leader, &limited, lengths).unwrap_err();
+        assert!(error.contains("of the joint that it follows"), "{error}");
+    }
+    // A dead point in the middle of the limits, at 0 and whole turns from there.
+    let error = read("", ", position = [-0.5, 0.5]", "[0.3, 0.5, 0.4, 0.4]").unwrap_err();
+    assert!(error.contains("between -6.283185 and 0.000000 rad"), "{error}");
+    let error = read("", ", position = [0.5, 1.5]", "[0.5, 0.6, 0.5, 0.6000000001]").unwrap_err();
+    assert!(error.contains("two pairs of equal ones"), "{error}");
+}
+
 #[test]
 fn loops_that_are_none_are_reported() {
     let cases = [

@@ -446,3 +446,20 @@ joint = [
         }
     }
 }
+
+/// √(25·S)/5 is −√S for the root that is a square modulo the prime: only roots of S itself are read.
+#[test]
+fn a_root_of_another_number_is_refused() {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("root_verified.toml");
+    std::fs::write(&path, include_str!("loops/rocker.toml")).unwrap();
+    let config = Config::new(&path).language(Language::C).functions([Function::InverseDynamics]);
+    let text = config.source().unwrap();
+    let start = text.find("= root(").unwrap() + 2;
+    let end = start + text[start..].find(';').unwrap();
+    let inner = &text[start + 5..end - 1];
+    let verifier = Verifier::new(Arm::read(&path).unwrap(), Language::C, &text).unwrap();
+    for root in [format!("-(root({inner} * (real)25.0) / (real)5.0)"), format!("-root({inner})")] {
+        let other = format!("{}{root}{}", &text[..start], &text[end..]);
+        assert!(verifier.verify(&other, None).unwrap().difference.is_some(), "{root}");
+    }
+}

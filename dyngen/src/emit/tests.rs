@@ -2,13 +2,13 @@
 //! floating point.
 
 use super::Options;
-use crate::arm::{Arm, Linkage, ParameterKind};
+use crate::arm::{Arm, ParameterKind};
 use crate::consistency;
 use crate::dynamics::Function;
-use crate::exact::rational::to_f64;
 use crate::model::{Error, Model};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
+use std::collections::BTreeSet;
 
 /// The test module for the functions of a file; each test needs those that it compares.
 ///
@@ -155,17 +155,19 @@ fn parameters(values: &[f64]) -> TokenStream {
 /// Lines that move coordinates of some q to where loops close: about the middle of their joints' limits.
 fn where_loops_close(arm: &Arm) -> Option<TokenStream> {
     let drives = arm.drives();
-    let line = |linkage: &Linkage| {
-        let drive = &drives[linkage.joint];
-        let (ratio, offset) = (to_f64(&drive.ratio), to_f64(&drive.offset));
-        let [lower, upper] = arm.joints[linkage.joint].position?.map(|x| (x - offset) / ratio);
+    let moved: BTreeSet<(usize, usize)> = arm
+        .linkages()
+        .map(|linkage| (drives[linkage.joint].coordinate, drives[linkage.joint].joint))
+        .collect();
+    let line = |(coordinate, joint): (usize, usize)| {
+        let [lower, upper] = arm.joints[joint].position?;
         // States are within 1.5.
         let [middle, factor] =
             [0.5 * (lower + upper), (upper - lower).abs() / 6.0].map(Literal::f64_suffixed);
-        let coordinate = Literal::usize_unsuffixed(drive.coordinate);
+        let coordinate = Literal::usize_unsuffixed(coordinate);
         Some(quote!(q[#coordinate] = #middle + #factor * q[#coordinate];))
     };
-    let lines: Vec<TokenStream> = arm.linkages().filter_map(line).collect();
+    let lines: Vec<TokenStream> = moved.into_iter().filter_map(line).collect();
     (!lines.is_empty()).then(|| {
         quote! {
             .map(|[mut q, dq, ddq]| {

@@ -2,7 +2,8 @@
 
 use super::body::{Body, apart, frames, placed};
 use super::known::Known;
-use crate::arm::{Arm, Joint};
+use crate::arm::{Arm, Hinge, Joint};
+use crate::exact::rational::{Rational, to_f64};
 use crate::import::Options;
 use crate::import::chain::{self, Chain};
 use crate::import::pose::Pose;
@@ -185,6 +186,20 @@ fn same_bars(arm: &Arm, chain: &Chain, frames: &[Pose]) -> Result<(), String> {
         ));
     }
     for (((closed, bar), frame), own) in chain.bars().zip(frames).zip(&arm.bars) {
+        let near = |length: f64, of_arm: &Rational| (length - to_f64(of_arm)).abs() <= APART;
+        let same = match &own.hinge {
+            None => closed.left.is_none(),
+            Some(Hinge { linkage, .. }) => {
+                let [_, rod, rocker, _] = closed.lengths;
+                closed.left.is_some() && near(rod, &linkage.rod) && near(rocker, &linkage.rocker)
+            }
+        };
+        if !same {
+            return Err(format!(
+                "bar '{}': its loop has other lengths than that of bar '{}' of the arm file: it is another arm",
+                bar.name, own.name
+            ));
+        }
         let (normal, way) = (chain.joints[closed.first].direction, bar.pin - frame.origin);
         let distance = (way - normal * normal.dot(&way)).norm();
         if distance > APART {

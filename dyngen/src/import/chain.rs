@@ -165,9 +165,16 @@ fn close_loops(
     joints: &mut [ChainJoint],
     notes: &mut Vec<String>,
 ) -> Vec<ChainLoop> {
-    let mut found = Vec::new();
+    let mut found: Vec<ChainLoop> = Vec::new();
     for connect in &tree.robot.connects {
-        match loops::close(tree, options.angle_tolerance, path, joints, connect) {
+        let single = |(closed, more): (ChainLoop, Vec<String>)| {
+            let on_one = |other: &ChainLoop| other.first == closed.first && other.left.is_some();
+            match closed.left.is_some() && found.iter().any(on_one) {
+                true => Err("its joint has another loop that is no parallelogram".to_string()),
+                false => Ok((closed, more)),
+            }
+        };
+        match loops::close(tree, options.angle_tolerance, path, joints, connect).and_then(single) {
             Ok((closed, more)) => {
                 // Its bars are bodies of the arm.
                 let of_bar = |note: &String| {

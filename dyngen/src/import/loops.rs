@@ -208,7 +208,11 @@ fn middle_pin(sides: &[Vector3<f64>; CORNERS], joint: &ChainJoint) -> Result<boo
     let (x, y) = (sides[0] / first, joint.direction.cross(&sides[0]) / first);
     let exact = |v: f64| rational::from_f64(v).unwrap_or_default();
     let in_plane = |v: Vector3<f64>| [v.dot(&x), v.dot(&y)].map(exact);
-    let left = (sides[1] + sides[2]).cross(&sides[1]).dot(&joint.direction) > 0.0;
+    let across = (sides[1] + sides[2]).cross(&sides[1]).dot(&joint.direction);
+    if across.abs() < SAME * rod * (rod + rocker) {
+        return Err("at q = 0 it is at a dead point, where its middle pin may be on either side".to_string());
+    }
+    let left = across > 0.0;
     let linkage = Linkage {
         joint: 0,
         outer: in_plane(sides[0]),

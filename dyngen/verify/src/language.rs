@@ -221,10 +221,14 @@ impl World<'_> {
                     None => return stop("a division by zero".to_string()),
                 }
             }
-            Kind::Root(x) => match self.number(x, names, depth)?.value.square_root() {
-                Some(root) => Value::Number(root.into()),
-                None => return stop("a root that none of the arm's loops has".to_string()),
-            },
+            Kind::Root(x) => {
+                let square = self.number(x, names, depth)?.value;
+                // Of no other number: √(25·S) need not be 5·√S modulo the prime.
+                match square.square_root().filter(|_| self.point.squares().contains(&square)) {
+                    Some(root) => Value::Number(root.into()),
+                    None => return stop("a root that none of the arm's loops has".to_string()),
+                }
+            }
             Kind::List(items) => Value::list(self.values(items, names, depth)?),
             Kind::Record(fields) => {
                 let field = |(name, e): &'e (String, Expr)| Ok((name.clone(), self.value(e, names, depth)?));

@@ -44,13 +44,22 @@ fn squares(linkage: &Linkage, [first, last]: &[Point; 2]) -> [Dual; 2] {
     [distance, root_of]
 }
 
+/// The squares of each linkage of an arm where sines and cosines are these; `None` where its joint's angle has
+/// none.
+pub(crate) fn at<'a>(arm: &'a Arm, circle: &'a Circle) -> impl Iterator<Item = Option<[Dual; 2]>> + 'a {
+    arm.linkages().map(|linkage| {
+        let (sine, cosine) = circle.sine_and_cosine(&of_joint(arm, linkage.joint))?;
+        let pins = pins(linkage, &(Dual::number(sine), Dual::number(cosine)));
+        Some(squares(linkage, &pins))
+    })
+}
+
 /// Whether every linkage of an arm closes where sines and cosines are these.
 pub(crate) fn close(arm: &Arm, circle: &Circle) -> bool {
-    arm.linkages().all(|linkage| {
-        let Some(turn) = circle.sine_and_cosine(&of_joint(arm, linkage.joint)) else { return false };
-        let pins = pins(linkage, &(Dual::number(turn.0), Dual::number(turn.1)));
-        let [distance, square] = squares(linkage, &pins);
-        distance.inverse().is_some() && square.inverse().is_some() && square.root().is_some()
+    at(arm, circle).all(|squares| {
+        squares.is_some_and(|[distance, square]| {
+            distance.inverse().is_some() && square.inverse().is_some() && square.root().is_some()
+        })
     })
 }
 

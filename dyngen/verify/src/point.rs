@@ -3,7 +3,7 @@
 use crate::angles::Circle;
 use crate::dual::Dual;
 use crate::lagrangian::{Chain, FIRST, SECOND};
-use crate::linkage::close;
+use crate::linkage::{self, close};
 use dyngen_arm::arm::Arm;
 use dyngen_arm::exact::prime::{Draws, Fp};
 use dyngen_arm::exact::symbols::AngleSymbols;
@@ -57,6 +57,11 @@ impl<'a> Point<'a> {
             q: vec![Fp::ZERO; self.q.len()],
             ..self.clone()
         }
+    }
+
+    /// The numbers of which the arm's loops have roots.
+    pub(crate) fn squares(&self) -> Vec<Fp> {
+        linkage::at(self.arm, &self.circle).flatten().map(|[_, square]| square.at(0)).collect()
     }
 
     pub(crate) fn dof(&self) -> usize {

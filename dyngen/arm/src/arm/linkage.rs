@@ -93,7 +93,7 @@ impl Linkage {
     fn ranges(&self) -> Vec<[f64; 2]> {
         let [low, high] = self.closing();
         let (near, far) = (high.min(1.0).acos(), low.max(-1.0).acos());
-        let ranges = match (high >= 1.0, low <= -1.0) {
+        let ranges = match (high > 1.0 + SAME, low < -1.0 - SAME) {
             (true, _) => vec![[-far, far]],
             (false, true) => vec![[near, TAU - near]],
             (false, false) => vec![[near, far], [-far, -near]],

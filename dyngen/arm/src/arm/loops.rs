@@ -50,6 +50,7 @@ pub(super) fn read(
         return None;
     }
     let mut bars = Vec::new();
+    let mut linkages: Vec<(&Table<'_, '_>, Linkage)> = Vec::new();
     let mut sound = true;
     for t in tables {
         reader.unknown_keys(t, &KEYS);
@@ -64,12 +65,13 @@ pub(super) fn read(
             sound = false;
             continue;
         };
-        let joint = |bar: &Bar| bar.hinge.as_ref().map(|hinge| hinge.linkage.joint);
-        let turned = own.iter().find_map(joint);
-        if turned.is_some() && bars.iter().any(|other: &Bar| joint(other) == turned) {
-            let message = format!("{}: its joint has another loop that is no parallelogram", t.place);
-            reader.errors.error(t.span.clone(), message);
-            sound = false;
+        if let Some(hinge) = own.iter().find_map(|bar| bar.hinge.as_ref()) {
+            if linkages.iter().any(|(_, other)| other.joint == hinge.linkage.joint) {
+                let message = format!("{}: its joint has another loop that is no parallelogram", t.place);
+                reader.errors.error(t.span.clone(), message);
+                sound = false;
+            }
+            linkages.push((t, hinge.linkage.clone()));
         }
         for bar in own {
             if bars.iter().any(|other: &Bar| other.name == bar.name) {
@@ -81,6 +83,13 @@ pub(super) fn read(
                 sound = false;
             }
             bars.push(bar);
+        }
+    }
+    // Now every joint that follows another one is known.
+    for (t, linkage) in &linkages {
+        if let Some(why) = open(joints, linkage) {
+            reader.errors.error(t.span.clone(), format!("{}: {why}", t.place));
+            sound = false;
         }
     }
     sound.then_some(bars)
@@ -101,14 +110,36 @@ fn read_one(
     let left = reader.optional(t, "middle", |r, v| side(r, v, place));
     let (first, last, pins) = named?;
     let found = Loop { first, last, pins, lengths: lengths?, inner: inner?, outer: outer?, left: left? };
-    let wrong = planar(joints, convention, &found)
-        .or_else(|| found.unequal(convention, joints))
-        .or_else(|| found.open(joints));
+    let wrong = planar(joints, convention, &found).or_else(|| found.unequal(convention, joints));
     if let Some(why) = wrong {
         reader.errors.error(t.span.clone(), format!("{place}: {why}"));
         return None;
     }
     Some(found)
+}
+
+/// Why a linkage does not close within the limits of its joint; of one that follows others, within those of
+/// the joint that moves on its own.
+fn open(joints: &[Joint], linkage: &Linkage) -> Option<String> {
+    let joint = &joints[linkage.joint];
+    let (mut leader, mut ratio, mut offset) = (joint, 1.0, 0.0);
+    // A circle of joints is reported elsewhere.
+    for _ in joints {
+        let Some(mimic) = &leader.mimic else { break };
+        offset += ratio * to_f64(&mimic.offset);
+        ratio *= to_f64(&mimic.ratio);
+        leader = &joints[mimic.joint];
+    }
+    // Without limits the joint that moves on its own may turn as far as it likes.
+    let limits = leader.position.map(|limits| limits.map(|q| ratio * q + offset));
+    let limits = limits.map(|[a, b]| [a.min(b), a.max(b)]);
+    let closes = linkage.open_within(limits, joint.theta.radians())?;
+    let of = if joint.mimic.is_some() { ", of the joint that it follows," } else { "" };
+    Some(format!(
+        "it closes only where q of joint {} is {closes}, and at these ends it is at a dead point: give the \
+         joint{of} limits (position) within",
+        linkage.joint + 1
+    ))
 }
 
 /// The four joints of a loop: the first and the last of the chain, and the names of the others.
@@ -315,7 +346,9 @@ impl Loop {
             ));
         }
         // Then the number of which a root is taken is a square, and the loop may change its way to close.
-        let two_pairs = equal || first == second && third == fourth;
+        let same = |a: &Rational, b: &Rational| to_f64(&(a - b)).abs() < SAME;
+        let two_pairs =
+            same(first, third) && same(second, fourth) || same(first, second) && same(third, fourth);
         if two_pairs && (self.left.is_some() || !equal) {
             return Some(
                 "its bars are two pairs of equal ones: of such loops only parallelograms are supported \
@@ -359,18 +392,6 @@ impl Loop {
             rocker: rocker.clone(),
             left: self.left?,
         })
-    }
-
-    /// Why a loop that is no parallelogram does not close within the limits of its joint.
-    fn open(&self, joints: &[Joint]) -> Option<String> {
-        let linkage = self.linkage()?;
-        let joint = &joints[self.first];
-        let closes = linkage.open_within(joint.position, joint.theta.radians())?;
-        Some(format!(
-            "it closes only where q of joint {} is {closes}, and at these ends it is at a dead point: give the \
-             joint limits (position) within",
-            self.first + 1
-        ))
     }
 
     /// The loop's bars that are no links, from the outer link on.
