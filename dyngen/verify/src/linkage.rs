@@ -44,8 +44,8 @@ fn squares(linkage: &Linkage, [first, last]: &[Point; 2]) -> [Dual; 2] {
     [distance, root_of]
 }
 
-/// The squares of each linkage of an arm where sines and cosines are these; `None` where its joint's angle has
-/// none.
+/// The squares of each linkage of an arm where sines and cosines are these; `None` where its joint's angle
+/// has none.
 pub(crate) fn at<'a>(arm: &'a Arm, circle: &'a Circle) -> impl Iterator<Item = Option<[Dual; 2]>> + 'a {
     arm.linkages().map(|linkage| {
         let (sine, cosine) = circle.sine_and_cosine(&of_joint(arm, linkage.joint))?;

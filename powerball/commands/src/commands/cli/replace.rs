@@ -1,8 +1,8 @@
 //! Which files a command may replace: those that the same command made, and others with `--force`.
 //!
 //! A page names in its head or its foot the program that made it; a JSON object is recognised by the keys of
-//! its result, any other text by its first line, which is its header. A log is never recognised: it may be the
-//! only one of its kind.
+//! its result, any other text by its first line, which is its header. A log is never recognised: it may be
+//! the only one of its kind.
 
 use super::{Cli, Failure};
 use clap::CommandFactory;
