@@ -192,7 +192,9 @@ fn the_same_seed_gives_the_same_logs_and_another_one_others() {
 
 #[test]
 fn an_effect_that_does_not_exist_is_wrong_use() {
-    let run = powerball(&["demo", "--effect", "ghosts", "--out", scratch("ghosts").to_str().unwrap()]);
+    let folder = scratch("ghosts");
+    let _ = std::fs::remove_dir_all(&folder);
+    let run = powerball(&["demo", "--effect", "ghosts", "--out", folder.to_str().unwrap()]);
     assert_eq!(run.status.code(), Some(2));
     assert!(complaint(&run).contains("load_friction"), "{}", complaint(&run));
 }

@@ -27,8 +27,9 @@ fn scratch(name: &str) -> PathBuf {
 /// recorded once, and every test has them in a folder of its own.
 fn session(name: &str) -> (PathBuf, Vec<String>, Vec<String>) {
     static RECORDED: OnceLock<Session> = OnceLock::new();
-    let recorded =
-        RECORDED.get_or_init(|| Session::record(&scratch("identify_logs"), 3, &["load_friction"]).unwrap());
+    // A folder of its own for each process that records: tests may be processes next to each other.
+    let logs = scratch(&format!("{name}_logs"));
+    let recorded = RECORDED.get_or_init(|| Session::record(&logs, 3, &["load_friction"]).unwrap());
     let folder = scratch(name);
     let own = |file: &PathBuf| {
         let copy = folder.join(file.file_name().unwrap());

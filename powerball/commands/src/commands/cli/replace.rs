@@ -146,6 +146,7 @@ fn is_alike(target: &Path, old: &[u8], new: Option<&[u8]>) -> bool {
     if let Some(own) = object(old) {
         let flat = |object: &serde_json::Map<String, Value>| object.values().all(Value::is_number);
         return match (RESULTS.iter().find(|(known, _)| *known == name), new.and_then(object)) {
+            (_, None) if new.is_some_and(|new| !new.is_empty()) => false,
             (Some((_, "")), _) => flat(&own),
             (Some((_, key)), _) => own.contains_key(*key),
             // Values are also what others give to this command: its own have its layout too.
@@ -178,6 +179,7 @@ mod tests {
             ("report.html", "<!doctype html><title>my report</title>", "", false),
             ("identified.json", "{\"friction\": []}", "", true),
             ("identified.json", "{\"notes\": 1}", "", false),
+            ("identified.json", "{\"friction\": []}", "fn code() {}", false),
             ("identified.json", "my notes", "", false),
             ("consistent.json", "{\"m1\": 1.5}", "", true),
             ("near.json", values, "{\"m1\": 2.0, \"m2\": 1}", true),
