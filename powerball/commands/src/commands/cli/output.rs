@@ -132,7 +132,7 @@ pub(crate) fn make_own_folder(
     title: &str,
     words: &str,
 ) -> Result<(), Failure> {
-    replace::check_own_folder(folder, names)?;
+    replace::own_folder::check(folder, names)?;
     make_folder(folder)?;
     let mut page = crate::report::Page::new(title);
     page.paragraph(words);

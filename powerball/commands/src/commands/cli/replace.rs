@@ -4,10 +4,9 @@
 //! its result, any other text by its first line, which is its header. A log is never recognised: it may be
 //! the only one of its kind.
 
-use super::{Cli, Failure};
-use clap::CommandFactory;
+use super::Failure;
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Text in every file that `powerball export` writes for a simulator.
@@ -42,22 +41,6 @@ pub(super) fn check_folder(folder: &Path) -> Result<(), Failure> {
     let pages = std::iter::once("report.html");
     let mut names = RESULTS.iter().map(|(name, _)| *name).chain(pages);
     names.try_for_each(|name| check(&folder.join(name), None))
-}
-
-/// Refuses a folder in which files begin with these names and no page is of this command, before anything is
-/// computed: for results that are many files, of which most are not recognised.
-#[cfg(feature = "cli")]
-pub(super) fn check_own_folder(folder: &Path, names: &[&str]) -> Result<(), Failure> {
-    let page = std::fs::read(folder.join("report.html"));
-    if FORCE.load(Ordering::Relaxed) || page.is_ok_and(|page| is_page_of(own().as_deref(), &page)) {
-        return Ok(());
-    }
-    let files = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let named = |file: &PathBuf| {
-        let name = file.file_name().unwrap_or_default().to_string_lossy();
-        names.iter().any(|begin| name.starts_with(begin))
-    };
-    files.filter(|file| file.is_file()).find(named).map_or(Ok(()), |file| Err(refused(&file)))
 }
 
 /// Refuses to replace a file that is not of the kind of `new`; without it by its name alone.
@@ -109,25 +92,6 @@ fn refused(target: &Path) -> Failure {
     ))
 }
 
-/// The name of the command that this process runs.
-fn own() -> Option<String> {
-    command(std::env::args())
-}
-
-/// Whether a page is of the command with this name, as its foot says.
-fn is_page_of(own: Option<&str>, page: &[u8]) -> bool {
-    let page = String::from_utf8_lossy(page);
-    let foot = page.rsplit_once(" UTC, powerball ").map(|(_, foot)| foot);
-    let made = foot.and_then(|foot| command(foot.split(['<', ' ']).map(str::to_string)));
-    made.is_some() && made.as_deref() == own
-}
-
-/// The command's name among the words of a command line.
-fn command(mut words: impl Iterator<Item = String>) -> Option<String> {
-    let cli = Cli::command();
-    words.find(|word| cli.get_subcommands().any(|known| known.get_name() == word.as_str()))
-}
-
 /// Whether a text is as this program writes the object.
 fn is_own_layout(object: &serde_json::Map<String, Value>, text: &[u8]) -> bool {
     crate::report::files::json(object).is_ok_and(|own| own.as_bytes() == text)
@@ -164,6 +128,50 @@ fn is_alike(target: &Path, old: &[u8], new: Option<&[u8]>) -> bool {
     }
     let first = |bytes: &[u8]| bytes.split(|b| *b == b'\n').next().map(<[u8]>::to_vec);
     new.is_some_and(|new| first(old) == first(new))
+}
+
+/// Folders of commands that write many files.
+#[cfg(feature = "cli")]
+pub(super) mod own_folder {
+    use super::super::{Cli, Failure};
+    use clap::CommandFactory;
+    use std::path::{Path, PathBuf};
+    use std::sync::atomic::Ordering;
+
+    /// Refuses a folder in which files begin with these names and no page is of this command, before anything
+    /// is computed: for results that are many files, of which most are not recognised.
+    pub(in super::super) fn check(folder: &Path, names: &[&str]) -> Result<(), Failure> {
+        let page = std::fs::read(folder.join("report.html"));
+        if super::FORCE.load(Ordering::Relaxed) || page.is_ok_and(|page| is_page_of(own().as_deref(), &page))
+        {
+            return Ok(());
+        }
+        let files = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+        let named = |file: &PathBuf| {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            names.iter().any(|begin| name.starts_with(begin))
+        };
+        files.filter(|file| file.is_file()).find(named).map_or(Ok(()), |file| Err(super::refused(&file)))
+    }
+
+    /// The name of the command that this process runs.
+    fn own() -> Option<String> {
+        command(std::env::args())
+    }
+
+    /// Whether a page is of the command with this name, as its foot says.
+    fn is_page_of(own: Option<&str>, page: &[u8]) -> bool {
+        let page = String::from_utf8_lossy(page);
+        let foot = page.rsplit_once(" UTC, powerball ").map(|(_, foot)| foot);
+        let made = foot.and_then(|foot| command(foot.split(['<', ' ']).map(str::to_string)));
+        made.is_some() && made.as_deref() == own
+    }
+
+    /// The command's name among the words of a command line.
+    fn command(mut words: impl Iterator<Item = String>) -> Option<String> {
+        let cli = Cli::command();
+        words.find(|word| cli.get_subcommands().any(|known| known.get_name() == word.as_str()))
+    }
 }
 
 #[cfg(test)]

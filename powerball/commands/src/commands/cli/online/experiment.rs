@@ -65,7 +65,7 @@ impl Experiment {
         }
         let read: Vec<&Path> = inputs.log.iter().map(PathBuf::as_path).collect();
         replace::check_inputs(&inputs.out.join(LOG), &read)?;
-        replace::check_own_folder(&inputs.out, &[LOG])?;
+        replace::own_folder::check(&inputs.out, &[LOG])?;
         let place = Where { bus: self.bus.clone(), json: inputs.json };
         let (bus, note) = self.arm(&inputs.arm, &place)?;
         Ok(Some(Opened { bus, place, consent: self.consent, note }))
