@@ -3,6 +3,10 @@ use super::*;
 use dyngen::Arm;
 use std::fmt::Write as _;
 
+mod columns;
+#[cfg(feature = "parquet")]
+mod of_parquet;
+
 const ARM: &str = r#"
 name = "two"
 convention = "standard"
@@ -245,72 +249,6 @@ fn decimal_commas_are_read_where_other_signs_stand_between_numbers() {
     }
 }
 
-#[test]
-fn aligned_columns_are_read() {
-    let (plain, _) = read(&text(HEADER, |_, f| Some(f.join(","))));
-    let aligned = |fields: Vec<String>| fields.iter().map(|f| format!("{f:>12}")).collect::<String>();
-    let header = aligned(HEADER.split(',').map(str::to_string).collect());
-    for (begin, end) in [("", ""), ("", "  "), ("  ", "\r")] {
-        let line = |_, f: Vec<String>| Some(format!("{begin}{}{end}", aligned(f)));
-        let (log, findings) = read(&text(&format!("{header}{end}"), line));
-        let (log, plain) = (log.unwrap(), plain.as_ref().unwrap());
-        assert_eq!((&log.t, &log.q, &log.torque), (&plain.t, &plain.q, &plain.torque), "{end:?}");
-        assert!(findings.is_empty(), "{findings:?}");
-    }
-}
-
-/// An arm whose second joint slides by up to 2 m.
-fn sliding() -> Arm {
-    let (first, second) = ARM.rsplit_once("[[joint]]").unwrap();
-    let second = second.replace("revolute", "prismatic") + "position = [-2, 2]\n";
-    Arm::parse(&format!("{first}[[joint]]{second}"), "two.toml").unwrap()
-}
-
-#[test]
-fn a_unit_is_that_of_joints_that_can_have_it() {
-    let read = |scale: [f64; 2], map: &str| {
-        let line = |_, mut f: Vec<String>| {
-            for (k, scale) in scale.iter().enumerate() {
-                f[k + 1] = format!("{:e}", f[k + 1].parse::<f64>().unwrap() * scale);
-            }
-            Some(f.join(","))
-        };
-        let map = ColumnMap::parse(map, "map").unwrap();
-        let asked = Asked { arm: &sliding(), map: &map, file: "x.csv", header: None, goals: false };
-        super::read::parse(text(HEADER, line).as_bytes(), asked, &mut Vec::new())
-    };
-    let plain = read([1.0, 1.0], "").unwrap();
-    let degree = std::f64::consts::PI / 180.0;
-    for (scale, map) in [
-        ([1.0 / degree, 1.0], "q.unit = \"deg\""),
-        ([1.0, 1e3], "q.unit = \"mm\""),
-        ([1.0 / degree, 1e3], "q.unit = [\"deg\", \"mm\"]"),
-        ([1.0, 1.0], "q.unit = \"rad\""),
-    ] {
-        let log = read(scale, map).unwrap();
-        for (own, other) in plain.q.iter().flatten().zip(log.q.iter().flatten()) {
-            assert!((own - other).abs() < 1e-12, "{map}: {own} {other}");
-        }
-    }
-    let said = |scale, map| read(scale, map).unwrap_err().to_string();
-    let wrong = said([1.0, 1.0], "q.unit = [\"deg\", \"deg\"]");
-    assert!(wrong.contains("q.unit: joint 2 slides: `deg` cannot be its unit"), "{wrong}");
-    let wrong = said([1.0, 1e3], "");
-    assert!(wrong.contains("q2: reaches 1000.0, the joint 2.000 m") && wrong.contains("\"mm\""), "{wrong}");
-}
-
-/// A joint that follows another has no column, and the next column is the next joint's.
-#[test]
-fn a_joint_that_follows_has_no_column() {
-    let (first, second) = ARM.rsplit_once("[[joint]]").unwrap();
-    let follower = second.replace("revolute", "prismatic") + "position = [0, 0.3]\nmimic = { joint = 1 }\n";
-    let arm = format!("{first}[[joint]]{follower}[[joint]]{second}");
-    let arm = Arm::parse(&arm, "three.toml").unwrap();
-    let mut findings = Vec::new();
-    parse(text(HEADER, |_, f| Some(f.join(","))).as_bytes(), "x.csv", &arm, &mut findings).unwrap();
-    assert!(findings.iter().all(|found| found.quantity != "q2"), "{findings:?}");
-}
-
 /// What people give by mistake is named by what it is.
 #[test]
 fn files_of_other_kinds_are_named() {
@@ -453,90 +391,6 @@ fn a_clock_that_runs_on_is_common_and_others_follow_each_other() {
     assert_eq!(restarted.map(|l| l.t[0] + l.clock), [0.0, 20.0, 30.0]);
 }
 
-/// Parquet with these columns of doubles; NaN stands for a missing value.
-#[cfg(feature = "parquet")]
-fn parquet_of(csv: &str) -> Vec<u8> {
-    use parquet::data_type::DoubleType;
-    use parquet::file::properties::WriterProperties;
-    use parquet::file::writer::SerializedFileWriter;
-    use parquet::schema::parser::parse_message_type;
-    use std::sync::Arc;
-
-    let mut lines = csv.lines();
-    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let rows: Vec<Vec<Option<f64>>> = lines.map(|l| l.split(',').map(|x| x.parse().ok()).collect()).collect();
-    let fields: String = names.iter().map(|n| format!("OPTIONAL DOUBLE {n};")).collect();
-    let schema = Arc::new(parse_message_type(&format!("message log {{ {fields} }}")).unwrap());
-    let properties = WriterProperties::builder().set_compression(parquet::basic::Compression::SNAPPY).build();
-    let mut bytes = Vec::new();
-    let mut writer = SerializedFileWriter::new(&mut bytes, schema, Arc::new(properties)).unwrap();
-    let mut group = writer.next_row_group().unwrap();
-    for k in 0..names.len() {
-        let levels: Vec<i16> = rows.iter().map(|r| i16::from(r[k].is_some())).collect();
-        let values: Vec<f64> = rows.iter().filter_map(|r| r[k]).collect();
-        let mut column = group.next_column().unwrap().unwrap();
-        column.typed::<DoubleType>().write_batch(&values, Some(&levels), None).unwrap();
-        column.close().unwrap();
-    }
-    group.close().unwrap();
-    writer.close().unwrap();
-    bytes
-}
-
-#[cfg(feature = "parquet")]
-#[test]
-fn parquet_says_the_same_as_csv() {
-    // One value is missing in line 50.
-    let csv = text("t,q1,q2,tau1,tau2", |k, mut fields| {
-        if k == 50 {
-            fields[3] = "nothing".into();
-        }
-        Some(fields[..5].join(","))
-    });
-    let (mut of_csv, mut of_parquet) = (Vec::new(), Vec::new());
-    let a = parse(csv.as_bytes(), "log", &arm(), &mut of_csv).unwrap();
-    let b = parse(&parquet_of(&csv), "log", &arm(), &mut of_parquet).unwrap();
-    assert_eq!((a.t, a.q, a.torque, a.pieces), (b.t, b.q, b.torque, b.pieces));
-    let messages = |f: &[Finding]| f.iter().map(|f| f.message.clone()).collect::<Vec<_>>();
-    assert_eq!(messages(&of_csv), messages(&of_parquet));
-    // Row 51 is line 52.
-    assert_eq!((of_csv[0].line, of_parquet[0].line), (Some(52), Some(51)));
-    let missing = parse(&parquet_of("t,q1,q2,tau1\n0,0,0,0\n"), "log", &arm(), &mut of_parquet);
-    assert!(missing.unwrap_err().to_string().contains("missing: tau2"));
-    let torn = parse(&parquet_of(&csv)[..500], "torn.parquet", &arm(), &mut of_parquet);
-    assert!(torn.unwrap_err().to_string().contains("torn.parquet: Parquet: cannot be read"));
-}
-
-/// What pyarrow wrote (`tests/data/README.md`), in both versions of data pages, with a dictionary and a
-/// missing value.
-#[cfg(feature = "parquet")]
-#[test]
-fn columns_compressed_with_zstandard_are_read() {
-    for file in [
-        include_bytes!("../../../../tests/data/zstd_v1.parquet").as_slice(),
-        include_bytes!("../../../../tests/data/zstd_v2.parquet"),
-    ] {
-        let mut findings = Vec::new();
-        let log = parse(file, "zstd.parquet", &arm(), &mut findings).unwrap();
-        assert_eq!(log.t.len(), 299);
-        for (k, t) in log.t.iter().enumerate() {
-            let row = if k < 50 { k } else { k + 1 };
-            assert_eq!(*t, row as f64 * 0.004);
-            assert!((log.q[0][k] - 0.5 * (1.3 * t).sin()).abs() < 1e-15);
-            assert!((log.torque[0][k] - 3.0 * t.cos()).abs() < 1e-15);
-            assert_eq!(log.torque[1][k], (row / 20) as f64);
-        }
-        assert!(findings.iter().any(|f| f.message.contains("note")), "{findings:?}");
-        // Cut or damaged anywhere, the file is refused or read, and nothing panics.
-        for end in (0..file.len()).step_by(97) {
-            let _ = parse(&file[..end], "torn.parquet", &arm(), &mut Vec::new());
-            let mut damaged = file.to_vec();
-            damaged[end] ^= 0x55;
-            let _ = parse(&damaged, "damaged.parquet", &arm(), &mut Vec::new());
-        }
-    }
-}
-
 /// Signals of [`text`] in memory: a log from them is the log from the file.
 fn signals(text: &str) -> (Vec<f64>, [Vec<Vec<f64>>; 2]) {
     let rows: Vec<Vec<f64>> =
@@ -605,48 +459,6 @@ fn arrays_that_are_no_log_name_quantity_and_sample() {
     assert_eq!(said.lines().count(), 1, "{said}");
     let holes = vec![torque[0].iter().map(|_| f64::NAN).collect(), torque[1].clone()];
     assert!(of(&q, &holes).starts_with("run:1: tau1: 200 of 200 samples"), "{}", of(&q, &holes));
-}
-
-/// The columns of a sound log under other names, in their order.
-fn named(header: &str) -> (Result<Log, LogError>, Vec<Finding>) {
-    read(&text(header, |_, f| Some(f.join(","))))
-}
-
-#[test]
-fn columns_of_other_names_are_read_where_each_quantity_has_one() {
-    let (plain, _) = named(HEADER);
-    for (header, map) in [
-        ("t,q0,q1,tau0,tau1", "q.column = [\"q0\", \"q1\"]"),
-        ("time,joint_1_pos,joint_2_pos,joint_1_effort,joint_2_effort", "t.column = \"time\""),
-        ("timestamp,actualPosition[0],actualPosition[1],motorTorque[0],motorTorque[1]", "motorTorque[1]"),
-        ("t,q1,q2,torque_1,torque_2", "tau.column = [\"torque_1\", \"torque_2\"]"),
-    ] {
-        let (log, findings) = named(header);
-        let (log, plain) = (log.unwrap(), plain.as_ref().unwrap());
-        assert_eq!((&log.t, &log.q, &log.torque), (&plain.t, &plain.q, &plain.torque), "{header}");
-        let said = findings.iter().find(|f| f.message.starts_with("read as --map")).unwrap();
-        assert!(said.message.contains(map), "{header}: {said}");
-    }
-    // A unit in the name is taken with it.
-    let (log, _) = named("time_ms,q1,q2,tau1,tau2");
-    assert_eq!(log.unwrap().t[10], 1e-3 * plain.unwrap().t[10]);
-}
-
-#[test]
-fn columns_that_may_be_read_in_two_ways_are_asked_for() {
-    for (header, reason) in [
-        // Seven columns for an arm of two joints less one.
-        ("t,q0,q1,q2,tau1", "which are 3 columns, the arm has 2 joints"),
-        ("time,stamp,q1,q2,tau1", "--map 't.column = \"time\"' --map 't.column = \"stamp\"'"),
-        ("t,arm_1_pos,arm_2_pos,motor_1_pos,motor_2_pos", "missing: q1, q2"),
-        ("t,arm_1_pos,arm_2_pos,motor_1_pos,motor_2_pos", "[\"arm_1_pos\", \"arm_2_pos\"]"),
-        ("t,arm_1_pos,arm_2_pos,motor_1_pos,motor_2_pos", "[\"motor_1_pos\", \"motor_2_pos\"]"),
-        // What was asked for is no measurement.
-        ("t,target_q_1,target_q_2,tau1,tau2", "missing: q1, q2"),
-    ] {
-        let said = named(header).0.unwrap_err().to_string();
-        assert!(said.contains(reason), "{header}: '{reason}' not in '{said}'");
-    }
 }
 
 #[test]

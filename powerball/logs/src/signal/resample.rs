@@ -37,17 +37,8 @@ pub fn cubic_at(t: &[f64], x: &[f64], i: usize, at: f64) -> f64 {
     if i == 0 || i + 2 >= t.len() {
         return linear();
     }
-    let mut sum = 0.0;
-    for j in i - 1..=i + 2 {
-        let mut weight = 1.0;
-        for m in i - 1..=i + 2 {
-            if m != j {
-                weight *= (at - t[m]) / (t[j] - t[m]);
-            }
-        }
-        sum += weight * x[j];
-    }
-    sum
+    let weights = weights(&[t[i - 1], t[i], t[i + 1], t[i + 2]], at);
+    weights.iter().zip(&x[i - 1..=i + 2]).map(|(w, x)| w * x).sum()
 }
 
 /// Values `x` at rising times `t` onto the grid `start + k·step`, by straight lines: noisy signals such as
@@ -100,7 +91,7 @@ pub fn smooth_at(t: &[f64], x: &[f64], at: f64) -> f64 {
     let first = t.partition_point(|t| *t <= at).checked_sub(AROUND / 2);
     let around = |first: usize| {
         let near = first..first.checked_add(AROUND)?;
-        Some((t.get(near.clone())?.try_into().ok()?, x.get(near)?))
+        Some((<&[f64; AROUND]>::try_from(t.get(near.clone())?).ok()?, x.get(near)?))
     };
     let Some((times, values)) = first.and_then(around) else { return linear_at(t, x, at) };
     let weights = weights(times, at);
@@ -111,9 +102,9 @@ pub fn smooth_at(t: &[f64], x: &[f64], at: f64) -> f64 {
 }
 
 /// The weights of samples at some times in the polynomial through them, at one time.
-fn weights(times: &[f64; AROUND], at: f64) -> [f64; AROUND] {
+fn weights<const N: usize>(times: &[f64; N], at: f64) -> [f64; N] {
     std::array::from_fn(|m| {
-        let others = (0..AROUND).filter(|other| *other != m);
+        let others = (0..N).filter(|other| *other != m);
         others.map(|other| (at - times[other]) / (times[m] - times[other])).product()
     })
 }
