@@ -19,8 +19,11 @@ const SPLITS_SHOWN: usize = 5;
 const MOST_STALE: f64 = 0.05;
 /// The fewest samples with which anything can be done.
 const FEWEST: usize = 20;
-/// Beyond this many times a limit of the arm a number is in another unit, not a bold motion.
+/// Beyond this many times a limit of the arm a position is in another unit, not a bold motion.
 const ABSURD: f64 = 3.0;
+/// Beyond this many times its limit a joint's typical torque is in another unit: mN·m and mA are a thousand
+/// times as large. Limits of URDFs are often no real ones, and several times too small.
+const OTHER_UNIT: f64 = 20.0;
 
 /// The log of samples that were read; what is odd about them is added to `findings`.
 pub(super) fn into_log(
@@ -381,24 +384,29 @@ fn units(
     let mut magnitudes: Vec<f64> = raw.effort[j].iter().map(|v| v.abs()).collect();
     magnitudes.sort_by(f64::total_cmp);
     let typical = magnitudes[magnitudes.len() / 2];
-    if let Some(limit) = joint.torque {
-        match effort {
-            Effort::Torque if typical > ABSURD * limit => {
-                let message = format!(
-                    "is typically {typical:.0}, the joint's limit is {limit} N·m: torques must be in N·m \
-                        (mN·m look like this: --map 'tau.unit = \"mN·m\"')"
-                );
-                error(format!("tau{}", j + 1), message);
-            }
-            Effort::Current(constants) if typical * constants[j].abs() > ABSURD * limit => {
-                let message = format!(
-                    "is typically {typical:.0}, which is {:.0} N·m where the joint's limit is {limit}: \
-                        currents must be in A (mA look like this: --map 'i.unit = \"mA\"')",
-                    typical * constants[j]
-                );
-                error(format!("i{}", j + 1), message);
-            }
-            _ => {}
+    let Some(limit) = joint.torque else { return };
+    let (column, torque, unit) = match effort {
+        Effort::Torque => {
+            ("tau", typical, "torques must be in N·m (mN·m look like this: --map 'tau.unit = \"mN·m\"')")
         }
+        Effort::Current(constants) => (
+            "i",
+            typical * constants[j].abs(),
+            "currents must be in A (mA look like this: --map 'i.unit = \"mA\"')",
+        ),
+        Effort::Goal => return,
+    };
+    let quantity = format!("{column}{}", j + 1);
+    let torque_is =
+        format!("is typically {torque:.0} N·m, the joint's torque limit in the arm file is {limit} N·m");
+    if torque > OTHER_UNIT * limit {
+        error(quantity, format!("{torque_is}: {unit}; or the limit is no real one: correct it"));
+    } else if torque > limit {
+        findings.push(Finding {
+            file: file.to_string(),
+            line: None,
+            quantity,
+            message: format!("{torque_is}: the limit is no real one, or the unit is another"),
+        });
     }
 }
