@@ -17,6 +17,9 @@ pub struct ExplainOptions<'a> {
     /// The known model: that of an earlier explanation for the same arm file. Its torque is subtracted from
     /// the logs without changes; new effects are added to it.
     pub known: Option<TorqueModel>,
+    /// Whether the search runs again without each log in turn, so that names which need one log are marked
+    /// (see [`Again`](crate::explain::Again)). It takes that many times longer.
+    pub leave_one_out: bool,
     /// Names that an experiment has ruled out.
     pub ruled_out: Vec<RuledOut>,
     /// Who wants to know what is being done.

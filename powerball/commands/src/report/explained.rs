@@ -152,13 +152,23 @@ fn answer(page: &mut Page, explained: &Explained) {
                 list(&effect.joints),
                 effect.size(&explained.sliding),
                 format!("{:.0} of 100", 100.0 * effect.probability),
-                effect.logs.join(", "),
+                logs_of(effect),
             ]);
         }
         page.table(&table);
     }
     for v in explained.verdict.iter().filter(|v| !v.advice.is_empty()) {
         page.paragraph(&format!("Joint {}: {}.", v.joint, v.advice));
+    }
+}
+
+/// The logs that an effect is in, and whether it is seen in some of those that it should be in.
+fn logs_of(effect: &NamedEffect) -> String {
+    match effect.again {
+        Some(again) if effect.in_some_logs => {
+            format!("seen in some: {} of {} searches on fewer logs give it", again.found, again.of)
+        }
+        _ => effect.logs.join(", "),
     }
 }
 

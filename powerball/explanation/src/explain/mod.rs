@@ -17,8 +17,10 @@
 //! | `by_log` | differences of one log from the others |
 //! | `prepare`, `step` | the base model, with which the search begins, and one step of the loop |
 //! | `findings`, `results` | the findings; the model, the report and its figures |
+//! | `again` | the same search on fewer logs: which names last |
 
 mod above_band;
+mod again;
 mod by_log;
 mod comparison;
 mod findings;
@@ -36,7 +38,7 @@ use above_band::ripple_above_band;
 use comparison::{History, withhold, withhold_harmful};
 pub use comparison::{Hypothesis, Open};
 use findings::Findings;
-pub use named::{FalsePositives, FitErrors, NamedEffect, Rival};
+pub use named::{Again, FalsePositives, FitErrors, NamedEffect, Rival};
 use powerball_logs::log::Log;
 use powerball_logs::regression::RigidArm;
 use prepare::{Inertia, Prepared, ValidationOnly, initial_model, prepare};
@@ -72,7 +74,12 @@ pub fn explain_body(
         findings = findings.or_better(found(Inertia::PerJoint, ValidationOnly::Kept)?);
     }
     options.progress.say("examining the remaining error");
-    results::conclude(findings)
+    let mut explained = results::conclude(findings)?;
+    if options.leave_one_out {
+        let search = |logs: &[Log], options: &ExplainOptions<'_>| explain_body(body, logs, validate, options);
+        again::find_again(search, logs, options, &mut explained)?;
+    }
+    Ok(explained)
 }
 
 /// Adds one effect after the other until nothing passes and nothing is taken back; laws without a name where

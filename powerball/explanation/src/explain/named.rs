@@ -2,6 +2,7 @@
 
 use crate::effects::Figures;
 use crate::effects::words::Words;
+use crate::rule::Rule;
 use powerball_controller::JointNumber;
 use powerball_identification::estimate::ResidualStats;
 use serde::Serialize;
@@ -38,6 +39,13 @@ pub struct NamedEffect {
     /// Logs it is in, where it is in some only.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub logs: Vec<String>,
+    /// In how many parts of the logs it was found again, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub again: Option<Again>,
+    /// Whether no more than half of these parts gave it ([`most`](crate::rule::Rule::most)): it is seen in
+    /// some logs, and is not certain.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub in_some_logs: bool,
     /// How often a name with such evidence is right ([`Evidence`](super::Evidence), docs/study.md).
     pub probability: f64,
     /// The name's penalised gain over that of the next best name on the same joints.
@@ -50,6 +58,23 @@ pub struct NamedEffect {
     pub class: String,
     /// Names that were considered for the same residual.
     pub rivals: Vec<Rival>,
+}
+
+/// In how many parts of the logs a name was found again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Again {
+    /// Parts that give the name on one of its joints.
+    pub found: usize,
+    /// Parts that were searched.
+    pub of: usize,
+}
+
+impl Again {
+    /// Whether a name is in some logs only: no more than half of the parts give it.
+    #[must_use]
+    pub(super) fn is_in_some(self, rule: &Rule) -> bool {
+        self.found as f64 <= rule.most * self.of as f64
+    }
 }
 
 impl NamedEffect {

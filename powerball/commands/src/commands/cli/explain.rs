@@ -50,6 +50,10 @@ pub(crate) struct Explain {
     /// are removed from the logs unchanged; what is found is added.
     #[arg(long, value_name = "FILE.json")]
     model: Option<PathBuf>,
+    /// Search again without each log in turn (of one log, in each half): names that no more than half of
+    /// these searches give are marked as seen in some logs. It takes that many times longer.
+    #[arg(long)]
+    leave_one_out: bool,
     /// Print how long each phase took, on standard error.
     #[arg(long)]
     timings: bool,
@@ -76,8 +80,10 @@ impl Explain {
         let known = known.map_err(|e| Failure::Unusable(e.to_string()))?;
         let recorded = recorded(&self.inputs, &self.validate, &arm, &progress)?;
         let say = |what: &str| progress.say(what);
+        let leave_one_out = self.leave_one_out;
+        let progress_of = logs::Progress::to(&say);
         let options =
-            ExplainOptions { known, progress: logs::Progress::to(&say), ..ExplainOptions::default() };
+            ExplainOptions { known, leave_one_out, progress: progress_of, ..ExplainOptions::default() };
         let refused = |e| self.failure(&e);
         let prepared = Prepared::new(&arm, &recorded.fit, &recorded.validate, &options).map_err(refused)?;
         let (mut explained, motion) = prepared.explained(&options).map_err(refused)?;
@@ -115,10 +121,10 @@ impl Explain {
         let experiment = self.experiment.is_requested();
         #[cfg(not(feature = "cli"))]
         let experiment = false;
-        if self.model.is_some() || experiment {
+        if self.model.is_some() || self.leave_one_out || experiment {
             return Err(Failure::Unusable(
-                "--model and --experiment take logs with torques; these are of position servos (goal1 … and \
-                no torque)"
+                "--model, --leave-one-out and --experiment take logs with torques; these are of position \
+                servos (goal1 … and no torque)"
                     .into(),
             ));
         }
@@ -290,7 +296,7 @@ fn names(explained: &Explained, most: usize) -> Vec<String> {
             on(&effect.joints, explained.verdict.len()),
             effect.size(&explained.sliding),
             100.0 * effect.probability,
-            in_logs(effect),
+            again(effect),
             not(effect)
         )
     };
@@ -300,6 +306,21 @@ fn names(explained: &Explained, most: usize) -> Vec<String> {
         lines.push(format!("and {} more: {}", more.len(), more.join(", ")));
     }
     lines
+}
+
+/// In which logs a name is, and whether it was found again in fewer of them.
+fn again(effect: &NamedEffect) -> String {
+    match effect.again {
+        Some(again) if effect.in_some_logs => {
+            format!(
+                "{}; seen in some logs: {} of {} searches on fewer give it",
+                in_logs(effect),
+                again.found,
+                again.of
+            )
+        }
+        _ => in_logs(effect),
+    }
 }
 
 fn in_logs(effect: &NamedEffect) -> String {

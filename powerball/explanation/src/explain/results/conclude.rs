@@ -151,6 +151,8 @@ fn named_effect(
         p_value: own().map(|(a, ..)| a.p_value).fold(0.0, f64::max),
         held_out_gain: own().map(|(a, ..)| a.fold_gain).collect(),
         logs,
+        again: None,
+        in_some_logs: false,
         // The remaining error is known only when all names are.
         probability: f64::NAN,
         margin: first.comparison.margin,
@@ -219,6 +221,8 @@ fn add_pushes_at_rest(
         p_value: f_tail(beyond * beyond, 1.0, 100.0),
         held_out_gain: Vec::new(),
         logs,
+        again: None,
+        in_some_logs: false,
         probability: f64::NAN,
         margin: pushes.iter().map(|p| p.size).fold(f64::INFINITY, f64::min),
         leftover: pushes.iter().map(|p| 1.0 - p.share).sum::<f64>() / pushes.len() as f64,

@@ -237,6 +237,8 @@ fn named(
         p_value: seen.iter().map(|seen| seen.p_value).fold(0.0, f64::max),
         held_out_gain: seen.iter().map(|seen| median(&mut seen.fold_gains.clone())).collect(),
         logs,
+        again: None,
+        in_some_logs: false,
         margin: seen.iter().map(|seen| seen.margin).fold(f64::INFINITY, f64::min),
         // No other column is fitted to validation logs.
         own_share: 1.0,

@@ -1,3 +1,4 @@
+mod again;
 mod laws;
 #[path = "../../../../../tests/support/measured.rs"]
 mod logs_of_arms;

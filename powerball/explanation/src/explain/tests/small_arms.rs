@@ -26,7 +26,7 @@ const FITTED: usize = 4;
 const LOGS: usize = 6;
 
 /// Two links in a vertical plane.
-fn planar() -> (Arm, Plant) {
+pub(super) fn planar() -> (Arm, Plant) {
     let arm = Arm::parse(include_str!("../../../../../tests/arms/planar2r.toml"), "planar2r.toml").unwrap();
     let bodies = vec![
         Body::even_box(4.0, [-0.2, 0.01, 0.0], [0.4, 0.08, 0.08], 4e-5),
@@ -74,7 +74,7 @@ fn explained_of((arm, usual): (Arm, Plant), effects: &[(Effect, &[usize])]) -> E
 }
 
 /// The logs of an arm with several effects, each in logs of its own.
-fn recorded(arm: &Arm, usual: &Plant, effects: &[(Effect, &[usize])]) -> Vec<Log> {
+pub(super) fn recorded(arm: &Arm, usual: &Plant, effects: &[(Effect, &[usize])]) -> Vec<Log> {
     const SEED: u64 = 7;
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     (0..LOGS)
@@ -95,11 +95,16 @@ fn recorded(arm: &Arm, usual: &Plant, effects: &[(Effect, &[usize])]) -> Vec<Log
         .collect()
 }
 
-fn explained_logs(arm: &Arm, mut logs: Vec<Log>) -> Explained {
+fn explained_logs(arm: &Arm, logs: Vec<Log>) -> Explained {
+    explained_with(arm, logs, &ExplainOptions::default())
+}
+
+/// What is found in such logs with some options.
+pub(super) fn explained_with(arm: &Arm, mut logs: Vec<Log>, options: &ExplainOptions<'_>) -> Explained {
     common_clock(&mut logs);
     let (fit, validate) = logs.split_at(FITTED);
     let body = RigidArm::new(arm).unwrap();
-    explain_body(&body, fit, validate, &ExplainOptions::default()).unwrap()
+    explain_body(&body, fit, validate, options).unwrap()
 }
 
 fn names(explained: &Explained) -> Vec<&str> {
