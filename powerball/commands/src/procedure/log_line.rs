@@ -4,7 +4,7 @@
 
 use powerball_bus::canopen::Micros;
 use powerball_bus::driver::{Counters, Driver};
-use powerball_logs::log::LogFile;
+use powerball_logs::log::{LogFile, TORQUE_LATE};
 use std::fmt;
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -120,18 +120,31 @@ impl MotionLog {
         })
     }
 
-    /// The line of the present cycle, in which `reference` (rad) was where the joints should be.
+    /// The line of the present cycle, in which `reference` (rad) was where the joints should be. `late` is by
+    /// how much the torques are later than the positions, s, where that is known: the same in all lines.
     ///
     /// # Errors
     /// Where it cannot be written.
-    pub fn take<const N: usize>(&mut self, driver: &Driver<N>, reference: &[f64]) -> io::Result<()> {
+    pub fn take<const N: usize>(
+        &mut self,
+        driver: &Driver<N>,
+        reference: &[f64],
+        late: Option<f64>,
+    ) -> io::Result<()> {
         let Some(out) = &mut self.out else { return Ok(()) };
         if self.begin.is_none() {
-            out.write_all(Columns::Everything.header(N).as_bytes())?;
+            let header = Columns::Everything.header(N);
+            let more = late.map_or(String::new(), |_| format!(",{TORQUE_LATE}"));
+            out.write_all(format!("{}{more}\n", header.trim_end()).as_bytes())?;
         }
         let begin = self.begin.get_or_insert(*driver.counters());
         let t = self.time.at(driver.synced_at());
         Columns::Everything.line(&mut self.line, t, driver, reference, begin);
+        if let Some(late) = late {
+            self.line.pop();
+            // Writing to a string cannot fail.
+            let _ = writeln!(self.line, ",{late:.6}");
+        }
         out.write_all(self.line.as_bytes())
     }
 

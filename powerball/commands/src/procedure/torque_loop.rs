@@ -23,6 +23,16 @@ const WITHIN: f64 = 0.999;
 /// This long before the set-points leave, a law is evaluated with what has come, µs.
 const LEAD: u64 = 300;
 
+/// From a SYNC to when the drives' own loop takes up the torque that it releases, s: a tick of the virtual
+/// drives. That of the LWA 4P's drives is not known.
+const TAKEN_UP: f64 = 0.5e-3;
+
+/// By how much the torque that a drive reports at a SYNC is later than the position: it is the one that it
+/// has held since the SYNC before, so it stands for the middle of that time.
+fn reported_late(period: f64) -> f64 {
+    0.5 * period - TAKEN_UP
+}
+
 /// The output of a law.
 #[derive(Clone, Copy, Debug)]
 pub struct Asked<const N: usize> {
@@ -162,7 +172,7 @@ impl<B: Bus, const N: usize> TorqueLoop<B, N> {
             let asked: Option<Asked<N>> = law(&measured).map(Into::into);
             if let Some(log) = log.as_deref_mut().filter(|_| !is_carried_on) {
                 let should = asked.and_then(|asked| asked.tracking).map_or(q, |tracking| tracking.position);
-                log.take(driver, &should).map_err(RecordError::Write)?;
+                log.take(driver, &should, Some(reported_late(period))).map_err(RecordError::Write)?;
             }
             let Some(asked) = asked else { return Ok(()) };
             let torque = self.limiter.limit(&asked.torque, period);

@@ -27,6 +27,9 @@ impl Asked<'_> {
     }
 }
 
+/// The column that says by how much the torques of a log are later than its positions, s: one value in all
+/// lines. Who records knows it, where drives hold a torque for a cycle and report it at its end.
+pub const TORQUE_LATE: &str = "tau_late";
 /// What LeRobot calls an arm's positions.
 const LEROBOT: &str = "observation.state";
 /// The quantities with the names that columns have for them: those of this project's own logs, of ROS and of
@@ -342,7 +345,8 @@ impl Columns {
             unused.push(("motor", message));
         }
         let used: Vec<usize> = self.groups().flat_map(|group| group.at.iter().copied()).collect();
-        let out: Vec<usize> = (0..names.len()).filter(|k| !used.contains(k)).collect();
+        let is_out = |k: &usize| !used.contains(k) && names[*k] != TORQUE_LATE;
+        let out: Vec<usize> = (0..names.len()).filter(is_out).collect();
         if !out.is_empty() {
             unused.push(("columns", format!("kept out: {}", shown(&out))));
         }

@@ -22,6 +22,7 @@ mod topics;
 
 pub use crate::tables::{Finding, LogError};
 pub use arrays::{Arrays, Sample};
+pub use columns::TORQUE_LATE;
 pub use file::LogFile;
 pub use inspect::{Aligned, Inspected, InspectedColumn, InspectedTable, TakenAs, inspect};
 pub use live::{LiveRows, LiveSample, Taken};

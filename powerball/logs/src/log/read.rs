@@ -3,8 +3,8 @@
 //! The file also has samples as they were read, before any doubt; the samples of a log while it is read, by
 //! whatever reader.
 
-use super::columns::{Asked, Columns};
-use super::map::ColumnMap;
+use super::columns::{Asked, Columns, TORQUE_LATE};
+use super::map::{ByJoint, ColumnMap, Mapped};
 use super::{Finding, Log, LogError, check, topics};
 use crate::tables::{Format, Place, RowSink, Table, columnar, make_room, read_dataset, read_topics, text};
 use dyngen::Arm;
@@ -286,22 +286,67 @@ pub(super) struct Samples<'a> {
     total: usize,
     bad: usize,
     first_bad: Option<(usize, String)>,
+    late: Option<Late>,
+}
+
+/// What the column [`TORQUE_LATE`] says.
+struct Late {
+    /// The column.
+    at: usize,
+    /// Its value, s, once there was a line.
+    value: Option<f64>,
+    /// The first line with another one.
+    changed: Option<usize>,
+}
+
+impl Late {
+    fn take(&mut self, line: usize, value: Option<f64>) {
+        let Some(value) = value else { return };
+        if *self.value.get_or_insert(value) != value {
+            self.changed.get_or_insert(line);
+        }
+    }
 }
 
 impl<'a> Samples<'a> {
     pub(super) fn new(asked: Asked<'a>, called: &'static str, findings: &'a mut Vec<Finding>) -> Samples<'a> {
-        Samples { asked, findings, called, names: Vec::new(), found: None, total: 0, bad: 0, first_bad: None }
+        let names = Vec::new();
+        Samples { asked, findings, called, names, found: None, total: 0, bad: 0, first_bad: None, late: None }
     }
 
     /// The log of what was taken; `torn` where the last line is.
-    pub(super) fn finish(self, torn: bool) -> Result<Log, LogError> {
+    pub(super) fn finish(mut self, torn: bool) -> Result<Log, LogError> {
         let map = self.asked.map;
+        let known = self.known_shift()?;
         let (log, effort, _) = self.finished(torn)?;
         Ok(match effort {
-            Effort::Torque => log.shifted(&map.tau),
+            Effort::Torque => log.shifted(known.as_ref().unwrap_or(&map.tau)),
             Effort::Current(_) => log.shifted(&map.i),
             Effort::Goal => log,
         })
+    }
+
+    /// How the torques are shifted by what the log itself says, where the map does not say it.
+    fn known_shift(&mut self) -> Result<Option<Mapped>, LogError> {
+        let map = &self.asked.map.tau;
+        let (Some(late), None) = (&self.late, &map.shift) else { return Ok(None) };
+        let finding = |line: Option<usize>, message: String| Finding {
+            file: self.asked.file.to_string(),
+            line,
+            quantity: TORQUE_LATE.to_string(),
+            message,
+        };
+        if late.changed.is_some() {
+            let message = "its value changes here: cut the log into one for each value".to_string();
+            return Err(LogError(vec![finding(late.changed, message)]));
+        }
+        let Some(value) = late.value.filter(|value| *value != 0.0) else { return Ok(None) };
+        let message = format!(
+            "torques are taken {:.2} ms earlier, as this column says; --map 'tau.shift = 0' leaves them",
+            1e3 * value
+        );
+        self.findings.push(finding(None, message));
+        Ok(Some(Mapped { shift: Some(ByJoint::All(-value)), ..map.clone() }))
     }
 
     /// The log of what was taken, what its torques were made of, and what only logs of servos have.
@@ -351,6 +396,11 @@ impl Samples<'_> {
         let Some((columns, raw)) = &mut self.found else { return Ok(()) };
         let mut values: Vec<Vec<f64>> =
             time.into_iter().chain(table.columns.into_iter().map(|c| c.values)).collect();
+        if let Some(late) = &mut self.late {
+            let of_column = values.get(late.at).into_iter().flatten();
+            let each = table.line.iter().zip(of_column);
+            each.for_each(|(line, value)| late.take(*line, Some(*value).filter(|v| v.is_finite())));
+        }
         let mut uses = columns.uses(&mut values);
         let keep: Vec<bool> = (0..table.line.len())
             .map(|k| {
@@ -380,6 +430,8 @@ impl RowSink for Samples<'_> {
         let columns = Columns::find(names, self.asked, self.findings)?;
         let raw = Raw::new(self.asked.arm.dof(), &columns);
         self.found = Some((columns, raw));
+        let at = names.iter().position(|name| name == TORQUE_LATE);
+        self.late = at.map(|at| Late { at, value: None, changed: None });
         self.names = names.to_vec();
         Ok(())
     }
@@ -403,7 +455,12 @@ impl RowSink for Samples<'_> {
         }
         self.total += 1;
         match columns.sample(&field) {
-            Some(values) => raw.push(line, &values),
+            Some(values) => {
+                raw.push(line, &values);
+                if let Some(late) = &mut self.late {
+                    late.take(line, field(late.at));
+                }
+            }
             None => {
                 self.bad += 1;
                 let names = &self.names;

@@ -65,6 +65,8 @@ impl Log {
 
 #[cfg(test)]
 mod tests {
+    use super::super::LogError;
+    use super::super::columns::TORQUE_LATE;
     use super::super::map::ColumnMap;
     use super::*;
 
@@ -91,5 +93,37 @@ mod tests {
             approx::assert_abs_diff_eq!(shifted.torque[1][k], log.torque[1][k], epsilon = 1e-12);
         }
         assert!(ColumnMap::parse("q.shift = 0.1", "--map").unwrap_err().contains("only `tau` and `i`"));
+    }
+
+    /// What a log says about its torques is what a map would say; the map counts where both do.
+    #[test]
+    fn a_log_says_itself_how_late_its_torques_are() {
+        use super::super::columns::Asked;
+        use super::super::read::parse;
+        let text = "name = \"one\"\nconvention = \"standard\"\ngravity = [0, 0, -9.81]\n[[joint]]\n\
+                    kind = \"revolute\"\na = 0.3\nalpha = 0\nd = 0\ntheta = 0\n";
+        let arm = dyngen::Arm::parse(text, "one.toml").unwrap();
+        let lines = |last: f64| {
+            let line = |k: i32| {
+                let (t, late) = (0.01 * f64::from(k), if k == 399 { last } else { 0.004 });
+                format!("{t:.2},{:.6},{:.6},{late}\n", (3.0 * t).sin(), (3.0 * t).cos())
+            };
+            "t,q1,tau1,tau_late\n".to_string() + &(0..400).map(line).collect::<String>()
+        };
+        let read = |text: String, map: &str| {
+            let map = ColumnMap::parse(map, "--map").unwrap();
+            let asked = Asked { arm: &arm, map: &map, file: "log.csv", header: None, goals: false };
+            let mut findings = Vec::new();
+            parse(text.as_bytes(), asked, &mut findings).map(|log| (log, findings))
+        };
+        let ((own, notes), (as_mapped, others)) =
+            (read(lines(0.004), "").unwrap(), read(lines(0.004), "tau.shift = -0.004").unwrap());
+        assert_eq!((&own.torque, &own.pieces), (&as_mapped.torque, &as_mapped.pieces));
+        assert!(notes.iter().any(|note| note.quantity == TORQUE_LATE && note.message.contains("4.00 ms")));
+        assert!(others.iter().all(|note| !note.to_string().contains(TORQUE_LATE)));
+        let as_logged = read(lines(0.004), "tau.shift = 0").unwrap().0;
+        assert!((own.torque[0][200] - as_logged.torque[0][200]).abs() > 1e-3);
+        let LogError(errors) = read(lines(0.002), "").unwrap_err();
+        assert_eq!((errors[0].line, errors[0].quantity.as_str()), (Some(401), TORQUE_LATE));
     }
 }

@@ -205,7 +205,8 @@ impl<M: ArmModel<f64, N>, const N: usize> Run<'_, M, N> {
         recorder.follow(motion, &torques, |k, master| {
             let Some(master) = master else { return Ok(()) };
             if let Some(log) = log.as_deref_mut() {
-                log.take(master.driver(), self.path.at(k as f64).q.as_slice()).map_err(RecordError::Write)?;
+                let reference = self.path.at(k as f64).q;
+                log.take(master.driver(), reference.as_slice(), None).map_err(RecordError::Write)?;
             }
             if !self.path.is_within(k) {
                 return Ok(());

@@ -284,7 +284,7 @@ fn of_sampling(study: &Study<'_>, model: &Model) -> Option<String> {
     let joints: Vec<String> =
         found.iter().flat_map(|f| &f.candidate.joints).map(ToString::to_string).collect();
     Some(format!(
-        "{} of {size} on joint {}: less than half a sample ({:.1} ms), as it is where torques are held for a \
+        "{} of {size} on joint {}: less than half a sample ({:.1} ms), as it is where torque offsets are held for a \
          cycle and logged at its end. The model has it, and the arm need not",
         effect.name(),
         joints.join(", "),
