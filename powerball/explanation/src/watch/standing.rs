@@ -1,0 +1,162 @@
+//! Touches of an arm that stands, which the test in motion does not see: friction is not determined there.
+//!
+//! The torque at rest is compared with limits that rests without contact showed. What was there already when
+//! the arm came to rest, or when the stream began, is no touch: it may be a body in the hand, and the test in
+//! motion judges it.
+
+use super::changes::{self, Change};
+use super::event::{Event, Evidence};
+use super::meaning::{CLEAR, OVER};
+use super::stream::Stream;
+use crate::torque_model::{BAND, Rest, RestLimits, RestPush, rests};
+use powerball_logs::log::logs_of_motors;
+use powerball_logs::regression::{DataOptions, Recording};
+use powerball_logs::signal::Band;
+use powerball_logs::signal::motion::LONGEST_REVERSAL;
+use serde_json::{Map, json};
+use std::ops::Range;
+
+/// Period at which the torque at rest is asked, s.
+const ASK: f64 = 0.2;
+/// Time back to the beginning of a touch, s: longer than it takes to report it, with what its filters need.
+const BACK: f64 = 10.0;
+/// Filters of the newest samples lack what comes next, s.
+const NEWEST: f64 = 0.16;
+
+/// What is known of touches at rest.
+#[derive(Debug)]
+pub(super) struct Standing {
+    limits: RestLimits,
+    /// When the torque is asked again, s.
+    ask: f64,
+    /// When a touch that is not reported yet was seen first, s.
+    seen: Option<f64>,
+    /// Until when touches are reported, s.
+    told: f64,
+    /// A touch that was reported and is not over.
+    lasting: Option<RestPush>,
+}
+
+impl Standing {
+    pub(super) fn new(limits: RestLimits) -> Standing {
+        Standing { limits, ask: f64::NEG_INFINITY, seen: None, told: f64::NEG_INFINITY, lasting: None }
+    }
+}
+
+impl Stream<'_> {
+    /// The touches that are clear now.
+    pub(super) fn stand(&mut self, ends: bool) -> Vec<Event> {
+        let now = self.buffer.latest();
+        let Some(mut standing) = self.standing.take_if(|standing| ends || now >= standing.ask) else {
+            return Vec::new();
+        };
+        standing.ask = now + ASK;
+        // What changed in motion must be known first.
+        let rest = if self.pending.is_none() { self.rest(&standing.limits, &self.changes) } else { None };
+        let events = match rest {
+            Some(rest) => self.touches(&mut standing, &rest, ends),
+            None => {
+                (standing.seen, standing.lasting) = (None, None);
+                Vec::new()
+            }
+        };
+        self.standing = Some(standing);
+        events
+    }
+
+    /// The rest of the last samples, where all joints stand long enough to be no reversal.
+    fn rest(&self, limits: &RestLimits, changes: &[Change]) -> Option<Rest> {
+        let (body, model) = (self.setting.body, self.setting.model);
+        let log = [self.buffer.log(self.buffer.latest() - BACK, self.setting.file)?];
+        let motors = logs_of_motors(body.arm(), &log);
+        let log = motors.first()?;
+        let all = log.pieces.first()?.clone();
+        let recording = Recording::new(log, 0, all, 1.0 / self.rate, DataOptions::default().smoothing)?;
+        let band = Band::new(BAND, self.rate);
+        let predicted = |still: &Recording| changes::torque(body, model, changes, still);
+        let mut rest = rests(&recording, &limits.velocity, &band, predicted).pop()?;
+        let (first, last) = (rest.at(0), rest.at(rest.len()));
+        let stands = last > self.buffer.latest() - 0.5 * NEWEST && last - first >= LONGEST_REVERSAL;
+        rest.shorten((NEWEST * self.rate).ceil() as usize);
+        (stands && rest.len() > 0).then_some(rest)
+    }
+
+    fn touches(&mut self, standing: &mut Standing, rest: &Rest, ends: bool) -> Vec<Event> {
+        let mut events = Vec::new();
+        let last = rest.at(rest.len());
+        let (mut waits, mut lasts) = (false, false);
+        for run in rest.pushed(&standing.limits) {
+            let [from, to] = [run.start, run.end].map(|k| rest.at(k));
+            let over = to + OVER < last;
+            if from <= standing.told {
+                // A part of what is reported.
+                standing.told = standing.told.max(to);
+                lasts |= !over;
+            } else if run.start > 0 {
+                let seen = *standing.seen.get_or_insert(self.buffer.latest());
+                if !(over || ends || last - from >= CLEAR) {
+                    waits = true;
+                    continue;
+                }
+                (standing.told, standing.seen) = (to, None);
+                let push = rest.push(self.setting.body, self.setting.file, &standing.limits, &run);
+                let Some(push) = push else { continue };
+                if self.release(&standing.limits, &run) {
+                    events.push(self.event(&push, seen, true, over));
+                } else if push.share >= self.setting.options.rule.most {
+                    events.push(self.event(&push, seen, false, over));
+                    standing.lasting = Some(push).filter(|_| !over);
+                    lasts |= !over;
+                }
+            }
+        }
+        standing.seen = standing.seen.filter(|_| waits);
+        if let Some(mut push) = standing.lasting.take_if(|_| !lasts) {
+            push.from = standing.told;
+            events.push(self.event(&push, self.buffer.latest(), true, true));
+        }
+        events
+    }
+
+    /// Whether a torque is that of a force which was known and has ended; it is forgotten then.
+    fn release(&mut self, limits: &RestLimits, run: &Range<usize>) -> bool {
+        let stays = |change: &Change| !matches!(change, Change::Force { .. });
+        let without: Vec<Change> = self.changes.iter().filter(|change| stays(change)).cloned().collect();
+        let rest = (without.len() < self.changes.len()).then(|| self.rest(limits, &without)).flatten();
+        let ended = rest.is_some_and(|rest| run.clone().all(|k| rest.size(limits, k) <= 1.0));
+        if ended {
+            self.changes = without;
+        }
+        ended
+    }
+
+    /// A touch, or the end of one; `over` says whether its end is known.
+    fn event(&self, push: &RestPush, time: f64, ends: bool, over: bool) -> Event {
+        let mut value = Map::new();
+        if !ends {
+            value.insert("force".into(), json!(push.force));
+            value.insert("link".into(), json!(push.point.link));
+            if over {
+                value.insert("end_time".into(), json!(push.to));
+            }
+        }
+        // What is put into the hand of an arm that stands pulls at it as a force does.
+        let rivals = if over { Vec::new() } else { vec!["payload".to_string()] };
+        Event {
+            time,
+            what: Change::Force { force: push.force, link: push.point.link }.name().to_string(),
+            joints: push.joints.clone(),
+            value,
+            since: push.from,
+            evidence: Evidence {
+                log: self.setting.file.to_string(),
+                ends,
+                alarm_joint: push.most,
+                capital: push.size,
+                explains: push.share * push.beyond.powi(2),
+                left: 1.0 - push.share,
+                rivals,
+            },
+        }
+    }
+}
