@@ -1,7 +1,7 @@
 //! The colour of a model's residual, and the size of its error: a watch compares changes with both.
 
 use super::at_rest::{RestLimits, rests};
-use super::rows::{BAND, Rows, Shown};
+use super::rows::{Rows, Shown};
 use super::{Detector, TorqueModel};
 use powerball_controller::change::{self, LEAST_MARGIN, ORDER};
 use powerball_identification::estimate::NormalEquations;
@@ -159,7 +159,7 @@ fn rest_limits(model: &TorqueModel, body: &RigidArm, recordings: &[Recording], r
     };
     let errors: Vec<f64> = joints.map(error).collect();
     let of = |recording: &Recording| {
-        let band = Band::new(BAND, recording.rate);
+        let band = Band::new(DataOptions::default().cutoff, recording.rate);
         rests(recording, &velocity, &band, |still| model.torque(body, still, &|_| false))
     };
     let rests: Vec<_> = recordings.iter().flat_map(of).collect();

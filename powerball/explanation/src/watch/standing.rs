@@ -8,7 +8,7 @@ use super::changes::{self, Change};
 use super::event::{Event, Evidence};
 use super::meaning::{CLEAR, OVER};
 use super::stream::Stream;
-use crate::torque_model::{BAND, Rest, RestLimits, RestPush, rests};
+use crate::torque_model::{Rest, RestLimits, RestPush, rests};
 use powerball_logs::log::logs_of_motors;
 use powerball_logs::regression::{DataOptions, Recording};
 use powerball_logs::signal::Band;
@@ -21,7 +21,7 @@ const ASK: f64 = 0.2;
 /// Time back to the beginning of a touch, s: longer than it takes to report it, with what its filters need.
 const BACK: f64 = 10.0;
 /// Filters of the newest samples lack what comes next, s.
-const NEWEST: f64 = 0.16;
+const NEWEST: f64 = 0.3;
 
 /// What is known of touches at rest.
 #[derive(Debug)]
@@ -72,7 +72,7 @@ impl Stream<'_> {
         let log = motors.first()?;
         let all = log.pieces.first()?.clone();
         let recording = Recording::new(log, 0, all, 1.0 / self.rate, DataOptions::default().smoothing)?;
-        let band = Band::new(BAND, self.rate);
+        let band = Band::new(DataOptions::default().cutoff, self.rate);
         let predicted = |still: &Recording| changes::torque(body, model, changes, still);
         let mut rest = rests(&recording, &limits.velocity, &band, predicted).pop()?;
         let (first, last) = (rest.at(0), rest.at(rest.len()));
