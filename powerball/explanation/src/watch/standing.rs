@@ -160,3 +160,69 @@ impl Stream<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::torque_model::tests::{body, model, recording};
+    use crate::torque_model::{Colour, TorqueModel};
+    use crate::watch::{Watch, WatchOptions};
+    use powerball_logs::log::LiveSample;
+    use powerball_logs::regression::RigidArm;
+
+    const FORCE: [f64; 3] = [10.0, -20.0, 30.0];
+
+    /// The events of 12 s at rest with [`FORCE`] times `size` of the time; no joint is watched in motion.
+    fn events(size: impl Fn(f64) -> f64) -> Vec<Event> {
+        let body: RigidArm = body();
+        let n = body.dof();
+        let rest = RestLimits { velocity: vec![0.03; n], limit: vec![3.0; n], noise: vec![0.1; n] };
+        let colour = Colour { rate: 100.0, joints: vec![None; n], rest: Some(rest) };
+        let model = TorqueModel { colour: Some(colour), ..model(&body, &[]) };
+        let mut still = recording(n, 0.0);
+        let q: Vec<f64> = (0..n).map(|j| 0.4 + 0.2 * j as f64).collect();
+        for (k, q_of) in still.q.iter_mut().enumerate() {
+            *q_of = q[k % n];
+        }
+        still.v.fill(0.0);
+        still.a.fill(0.0);
+        let usual = model.torque(&body, &still, &|_| false);
+        let lever = body.force_columns(&q).unwrap();
+        let options = WatchOptions::default();
+        let mut watch = Watch::new(&body, &model, &options, "log.csv");
+        let mut found: Vec<Event> = Vec::new();
+        for k in 0..1200 {
+            let t = 0.01 * f64::from(k);
+            // What friction holds, noise, and the push.
+            let torque = (0..n).map(|j| {
+                let force: f64 = (0..3).map(|axis| lever[axis][j] * FORCE[axis]).sum();
+                usual[j] + 0.1 + 0.1 * f64::from(k * (7 + j as i32)).sin() + size(t) * force
+            });
+            found.extend(watch.push(&LiveSample { t, q: q.clone(), torque: torque.collect() }));
+        }
+        found.extend(watch.finish());
+        found
+    }
+
+    /// A push that is over is one event; one that goes on is reported after 2 s, with the body that it may be,
+    /// and its end is another event. A force that was there from the first sample on is none.
+    #[test]
+    fn pushes_on_an_arm_that_stands_are_events_with_their_times() {
+        assert!(events(|_| 0.0).is_empty());
+        assert!(events(|_| 1.0).is_empty());
+        let found = events(|t| if (2.0..3.0).contains(&t) || (5.0..9.0).contains(&t) { 1.0 } else { 0.0 });
+        let [short, long, over] = found.as_slice() else { panic!("{found:?}") };
+        assert!(found.iter().all(|event| event.what == "contact_wrench"));
+        approx::assert_abs_diff_eq!(short.since, 2.0, epsilon = 0.1);
+        approx::assert_abs_diff_eq!(short.value["end_time"].as_f64().unwrap(), 3.0, epsilon = 0.1);
+        assert!(short.evidence.rivals.is_empty() && short.time < 3.0);
+        for (axis, force) in FORCE.iter().enumerate() {
+            approx::assert_abs_diff_eq!(short.value["force"][axis].as_f64().unwrap(), force, epsilon = 6.0);
+        }
+        approx::assert_abs_diff_eq!(long.since, 5.0, epsilon = 0.1);
+        assert!(long.time < 6.0 && !long.value.contains_key("end_time") && !long.evidence.ends);
+        assert_eq!(long.evidence.rivals, ["payload"]);
+        assert!(over.evidence.ends);
+        approx::assert_abs_diff_eq!(over.since, 9.0, epsilon = 0.1);
+    }
+}
