@@ -204,8 +204,8 @@ mod tests {
         found
     }
 
-    /// A push that is over is one event; one that goes on is reported after 2 s, with the body that it may be,
-    /// and its end is another event. A force that was there from the first sample on is none.
+    /// A push that is over is one event; one that goes on is reported after 2 s, with the body that it may
+    /// be, and its end is another event. A force that was there from the first sample on is none.
     #[test]
     fn pushes_on_an_arm_that_stands_are_events_with_their_times() {
         assert!(events(|_| 0.0).is_empty());
