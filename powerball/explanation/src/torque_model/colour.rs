@@ -1,5 +1,6 @@
 //! The colour of a model's residual, and the size of its error: a watch compares changes with both.
 
+use super::at_rest::{RestLimits, rests};
 use super::rows::{Rows, Shown};
 use super::{Detector, TorqueModel};
 use powerball_controller::change::{self, LEAST_MARGIN, ORDER};
@@ -7,6 +8,7 @@ use powerball_identification::estimate::NormalEquations;
 use powerball_logs::log::{Log, logs_of_motors};
 use powerball_logs::regression::{DataOptions, Recording, RigidArm};
 use powerball_logs::signal::resample::median_step;
+use powerball_logs::signal::{Band, motion};
 use serde::{Deserialize, Serialize};
 
 /// Least number of rows from which a joint's colour is learnt.
@@ -30,6 +32,9 @@ pub struct Colour {
     pub rate: f64,
     /// By joint; none for a joint that was not seen to move, or whose model's error is too large.
     pub joints: Vec<Option<JointColour>>,
+    /// How far torques at rest may be from the model's; none where no log shows it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rest: Option<RestLimits>,
 }
 
 /// The colour of one joint's rows.
@@ -91,18 +96,22 @@ impl Colour {
         let mut steps: Vec<f64> = logs.iter().filter_map(|log| median_step(&log.t)).collect();
         steps.sort_by(f64::total_cmp);
         let step = *steps.get(steps.len() / 2)?;
-        let mut rows = Vec::new();
+        let mut recordings: Vec<Recording> = Vec::new();
         for log in logs {
-            for piece in log.pieces.clone() {
-                let recording = Recording::new(log, 0, piece, step, DataOptions::default().smoothing);
-                // Shorter than what the band's filter needs at its ends: no rows.
-                for recording in recording.into_iter().filter(|r| r.len() as f64 > r.rate) {
-                    let predicted = model.torque(body, &recording, &|_| false);
-                    rows.push(Rows::new(model, body, &recording, &predicted));
-                }
-            }
+            let smoothing = DataOptions::default().smoothing;
+            let of = |piece| Recording::new(log, 0, piece, step, smoothing);
+            // Shorter than what the band's filter needs at its ends: no rows.
+            recordings
+                .extend(log.pieces.clone().into_iter().filter_map(of).filter(|r| r.len() as f64 > r.rate));
         }
-        Colour::of_rows(&rows, 1.0 / step, level, range)
+        let of = |recording: &Recording| {
+            let predicted = model.torque(body, recording, &|_| false);
+            Rows::new(model, body, recording, &predicted)
+        };
+        let rows: Vec<Rows> = recordings.iter().map(of).collect();
+        let mut colour = Colour::of_rows(&rows, 1.0 / step, level, range)?;
+        colour.rest = Some(rest_limits(model, body, &recordings, &rows));
+        Some(colour)
     }
 
     /// Like [`Colour::learn`], from rows of logs with `rate` samples a second.
@@ -129,8 +138,32 @@ impl Colour {
         // For joints that are calm alone but not together; if no such margin helps, each keeps its own.
         let by = least(1.0, TOGETHER, |by| is_calm(&scaled(by))).unwrap_or(1.0);
         let joints = scaled(by);
-        joints.iter().any(Option::is_some).then_some(Colour { rate, joints })
+        joints.iter().any(Option::is_some).then_some(Colour { rate, joints, rest: None })
     }
+}
+
+/// How far torques at rest may be from a model's where it holds.
+fn rest_limits(model: &TorqueModel, body: &RigidArm, recordings: &[Recording], rows: &[Rows]) -> RestLimits {
+    let joints = 0..body.dof();
+    let velocity = |j: usize| {
+        let speeds = recordings.iter().flat_map(|r| r.velocity(j).map(f64::abs)).collect();
+        motion::rest_velocity(speeds, body.velocity_limit(j))
+    };
+    let velocity: Vec<f64> = joints.clone().map(velocity).collect();
+    let error = |j: usize| {
+        let (mut square, mut count) = (0.0, 0.0);
+        for shown in rows.iter().flat_map(|rows| &rows.joints[j]).flatten() {
+            (square, count) = (square + shown.residual.powi(2), count + 1.0);
+        }
+        f64::sqrt(square / f64::max(count, 1.0))
+    };
+    let errors: Vec<f64> = joints.map(error).collect();
+    let of = |recording: &Recording| {
+        let band = Band::new(DataOptions::default().cutoff, recording.rate);
+        rests(recording, &velocity, &band, |still| model.torque(body, still, &|_| false))
+    };
+    let rests: Vec<_> = recordings.iter().flat_map(of).collect();
+    RestLimits::new(&velocity, &model.usual_at_rest(&errors), &rests.iter().collect::<Vec<_>>(), &[])
 }
 
 /// The least number in a range for which a condition holds that also holds for all larger ones; `None` if

@@ -4,6 +4,7 @@
 //! τ = rigid(q, q̇, q̈) + Eq. 16 friction + the terms of [`powerball_controller::correction`], in the units
 //! of the logs, at true positions: an encoder's offset is subtracted first.
 
+mod at_rest;
 mod c_api;
 mod colour;
 mod detector;
@@ -18,6 +19,8 @@ mod source;
 pub(crate) mod tests;
 
 use crate::effects::{PASSES, SOFT, Window, each_instant, move_link};
+pub use at_rest::RestLimits;
+pub(crate) use at_rest::{Rest, RestPush, Usual, rests};
 pub use colour::{Colour, JointColour};
 pub use detector::Detector;
 use dyngen::arm::ParameterKind;
@@ -189,6 +192,12 @@ impl TorqueModel {
     #[must_use]
     pub fn inertial(&self) -> Vec<f64> {
         self.parameters.iter().map(|p| p.value).collect()
+    }
+
+    /// The usual error of each joint's torque at rest, N·m; `errors` is that in motion, rms by joint.
+    pub(crate) fn usual_at_rest(&self, errors: &[f64]) -> Vec<Usual> {
+        let friction = self.gammas().into_iter().map(|g| g[0].abs() + g[2].abs());
+        friction.zip(errors).map(|(friction, error)| Usual { friction, error: *error }).collect()
     }
 
     /// γ1 … γ5 by joint.

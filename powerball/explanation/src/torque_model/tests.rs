@@ -46,14 +46,14 @@ pub(crate) fn every_law() -> Vec<Law<f64>> {
     ]
 }
 
-fn body() -> RigidArm {
+pub(crate) fn body() -> RigidArm {
     let mut arm = Arm::parse(include_str!("../../../lwa4p.toml"), "lwa4p.toml").unwrap();
     arm.groupings.clear();
     RigidArm::new(&arm).unwrap()
 }
 
 /// A model with the given laws at the second joint and values without meaning.
-fn model(body: &RigidArm, laws: &[Law<f64>]) -> TorqueModel {
+pub(crate) fn model(body: &RigidArm, laws: &[Law<f64>]) -> TorqueModel {
     let value = |k: usize| 0.3 + 0.1 * (k as f64 * 1.7).sin();
     let friction = (0..body.dof()).map(|joint| JointFriction::plain(joint, [4.5, 216.0, 2.0, 4.7, 15.0]));
     let term = |(k, law): (usize, &Law<f64>)| NamedTerm {
@@ -77,7 +77,7 @@ fn model(body: &RigidArm, laws: &[Law<f64>]) -> TorqueModel {
     }
 }
 
-fn recording(n: usize, shift: f64) -> Recording {
+pub(crate) fn recording(n: usize, shift: f64) -> Recording {
     let (rate, samples) = (100.0, 400);
     let wave = |k: usize, j: usize, d: usize| {
         let w = 1.0 + 0.3 * j as f64;

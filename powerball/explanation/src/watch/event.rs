@@ -35,7 +35,8 @@ pub struct Evidence {
     pub ends: bool,
     /// The joint on which the alarm rose.
     pub alarm_joint: JointNumber,
-    /// The mean capital of the bets over the level of the alarm.
+    /// The mean capital of the bets over the level of the alarm; at rest, the largest torque beyond the
+    /// model's over its joint's limit.
     pub capital: f64,
     /// χ² that the name explains.
     pub explains: f64,

@@ -16,9 +16,9 @@ const LEAD: f64 = 1.5;
 /// The longest stretch back to a change, s.
 const LONGEST: f64 = 30.0;
 /// A push that ended this long ago is over, s.
-const OVER: f64 = 0.4;
+pub(super) const OVER: f64 = 0.4;
 /// A name is given after this time where it is clear, s …
-const CLEAR: f64 = 2.0;
+pub(super) const CLEAR: f64 = 2.0;
 /// … and after this time in any case, s.
 const LATEST: f64 = 5.0;
 /// A change of another size by less than this share of it is the same one, better known.
@@ -60,7 +60,7 @@ impl Stream<'_> {
         let options = DataOptions { cutoff: BAND, ..DataOptions::default() };
         let logs = [log];
         let Ok(data) = Data::new(self.setting.body, &logs, &options) else { return nothing() };
-        let colour = Colour { rate: self.rate, joints: self.colours.clone() };
+        let colour = Colour { rate: self.rate, joints: self.colours.clone(), rest: None };
         let model = changes::with(self.setting.model, &self.changes);
         let rule = &self.setting.options.rule;
         let stretch = Stretch::new(&data, &model, self.residual(&data, &self.changes), &colour, rule);

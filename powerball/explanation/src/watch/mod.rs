@@ -2,13 +2,15 @@
 //!
 //! The test is [`powerball_controller::change`], whose false alarms have a stated rate; `stream` feeds it
 //! with the rows of a stream, `meaning` finds the cause of an alarm, with a name (`name`). After an event the
-//! model has the change, so that one change is one event.
+//! model has the change, so that one change is one event. An arm that stands is compared with other rests
+//! (`standing`).
 
 mod buffer;
 mod changes;
 mod event;
 mod meaning;
 mod name;
+mod standing;
 mod stream;
 
 use crate::rule::Rule;

@@ -375,8 +375,7 @@ impl<'a> Stretch<'a> {
     /// A body that the last link holds.
     fn payload(&self, context: &Context<'_>, guess: Guess, held: f64) -> Option<Named> {
         let joints = (0..self.data.dof()).map(JointNumber::from_index).collect();
-        let settings =
-            payload::Settings { com: None, stays: false, link: None, inertia: payload::Inertia::OfPoint };
+        let settings = payload::Settings::default();
         let mut candidate =
             Candidate { windows: vec![self.everywhere()], ..Candidate::on_all(joints, settings, 1) };
         let since = self.beginning(&context.columns(&candidate), guess);

@@ -4,6 +4,7 @@ use super::Setting;
 use super::buffer::Buffer;
 use super::changes::{self, Change};
 use super::event::Event;
+use super::standing::Standing;
 use crate::torque_model::{Colour, Detector, JointColour, Rows, rows_a_second};
 use powerball_controller::change::WINDOW;
 use powerball_logs::log::{LiveSample, logs_of_motors};
@@ -49,6 +50,8 @@ pub(super) struct Stream<'a> {
     pub(super) pending: Option<Pending>,
     /// Time at which the cause of an alarm is searched again, s.
     pub(super) ask: f64,
+    /// Touches at rest; none where no limits are known.
+    pub(super) standing: Option<Standing>,
     notes: Vec<String>,
 }
 
@@ -77,6 +80,7 @@ impl<'a> Stream<'a> {
             changes: Vec::new(),
             pending: None,
             ask: f64::NEG_INFINITY,
+            standing: known.and_then(|colour| colour.rest.clone()).map(Standing::new),
             notes,
         }
     }
@@ -168,7 +172,9 @@ impl<'a> Stream<'a> {
         if self.learns.contains(&true) && !rows.t.is_empty() {
             self.learn(&rows);
         }
-        self.decide(ends)
+        let mut events = self.decide(ends);
+        events.extend(self.stand(ends));
+        events
     }
 
     /// Gives the bets one row.

@@ -6,10 +6,10 @@
 use super::super::by_log::{Changed, Together, changes};
 use super::super::findings::Findings;
 use super::super::model::{Accepted, Model};
-use super::super::special::RestPush;
 use super::super::study::Study;
 use crate::effects::{Settings, Window, contact_wrench};
 use crate::rule::Rule;
+use crate::torque_model::RestPush;
 use powerball_controller::JointNumber;
 use powerball_identification::evidence::error_in_log;
 use powerball_logs::regression::{Data, Signals};

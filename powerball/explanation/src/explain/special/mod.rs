@@ -10,6 +10,6 @@ mod at_rest;
 mod one_path;
 mod validation_only;
 
-pub(super) use at_rest::{RestPush, pushes_at_rest};
+pub(super) use at_rest::pushes_at_rest;
 pub(super) use one_path::{Clock, choose_clock, predicts_better, repeats};
 pub(super) use validation_only::{Baseline, ValidationOnlyEffect, validation_only_effects};
