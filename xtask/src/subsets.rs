@@ -1,7 +1,8 @@
 //! Whether names that some of the logs give are contradicted by more of them.
 //!
 //! Each log judges in turn. To three of the others the model is fitted, and to all of them: a name of the few
-//! logs is taken back where all logs together give it on none of its joints.
+//! logs is taken back where all logs together give it on none of its joints. The few logs are searched with
+//! `leave_one_out`: whether names that are taken back, and no others, are marked as seen in some logs.
 
 use dyngen::Arm;
 use powerball::explanation::explain::NamedEffect;
@@ -31,29 +32,40 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
     let body = RigidArm::new(&arm).map_err(|e| e.to_string())?;
     let (mut logs, _) = read_logs(&arguments.log, &arm).map_err(|e| e.to_string())?;
     common_clock(&mut logs);
-    let explained = |fit: &[usize], judge: usize| -> Result<Explained, String> {
+    let explained = |fit: &[usize], judge: usize, leave_one_out: bool| -> Result<Explained, String> {
         let fit: Vec<Log> = fit.iter().map(|k| logs[*k].clone()).collect();
-        explain_body(&body, &fit, &logs[judge..=judge], &ExplainOptions::default()).map_err(|e| e.to_string())
+        let options = ExplainOptions { leave_one_out, ..ExplainOptions::default() };
+        explain_body(&body, &fit, &logs[judge..=judge], &options).map_err(|e| e.to_string())
     };
-    let (mut names, mut back) = (0, BTreeMap::<String, usize>::new());
+    let (mut back, mut marked) = (BTreeMap::<String, usize>::new(), [[0; 2]; 2]);
     let subsets = subsets(logs.len());
     for judge in 0..logs.len() {
         let others: Vec<usize> = (0..logs.len()).filter(|k| *k != judge).collect();
-        let all = explained(&others, judge)?;
+        let all = explained(&others, judge, false)?;
         println!("judged on {}: {}", logs[judge].file, words(&all.effects));
         // Every subset once: it is judged on the first log after its last one.
         for few in subsets.iter().filter(|few| judge_of(few, logs.len()) == judge) {
-            let some = explained(few, judge)?;
-            names += some.effects.len();
-            let is_back = |e: &&NamedEffect| !all.effects.iter().any(|other| other.is(&e.effect, &e.joints));
-            for effect in some.effects.iter().filter(is_back) {
-                println!("  {few:?}: {} taken back", words(std::slice::from_ref(effect)));
-                *back.entry(effect.effect.clone()).or_default() += 1;
+            let some = explained(few, judge, true)?;
+            for effect in &some.effects {
+                let is_back = !all.effects.iter().any(|other| other.is(&effect.effect, &effect.joints));
+                marked[usize::from(is_back)][usize::from(effect.in_some_logs)] += 1;
+                let done = match (is_back, effect.in_some_logs) {
+                    (true, true) => "taken back, marked",
+                    (true, false) => "taken back",
+                    (false, true) => "marked",
+                    (false, false) => continue,
+                };
+                println!("  {few:?}: {} {done}", words(std::slice::from_ref(effect)));
+                if is_back {
+                    *back.entry(effect.effect.clone()).or_default() += 1;
+                }
             }
         }
     }
-    let count: usize = back.values().sum();
-    println!("{count} of {names} names of three logs are taken back by all: {back:?}");
+    let [stay, back_at_all] = marked.map(|own| own[0] + own[1]);
+    let names = stay + back_at_all;
+    println!("{back_at_all} of {names} names of three logs are taken back by all: {back:?}");
+    println!("marked: {} of these {back_at_all}, and {} of the {stay} others", marked[1][1], marked[0][1]);
     Ok(())
 }
 

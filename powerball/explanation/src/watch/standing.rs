@@ -32,14 +32,14 @@ pub(super) struct Standing {
     /// When a touch that is not reported yet was seen first, s.
     seen: Option<f64>,
     /// Until when touches are reported, s.
-    told: f64,
+    reported: f64,
     /// A touch that was reported and is not over.
     lasting: Option<RestPush>,
 }
 
 impl Standing {
     pub(super) fn new(limits: RestLimits) -> Standing {
-        Standing { limits, ask: f64::NEG_INFINITY, seen: None, told: f64::NEG_INFINITY, lasting: None }
+        Standing { limits, ask: f64::NEG_INFINITY, seen: None, reported: f64::NEG_INFINITY, lasting: None }
     }
 }
 
@@ -88,9 +88,9 @@ impl Stream<'_> {
         for run in rest.pushed(&standing.limits) {
             let [from, to] = [run.start, run.end].map(|k| rest.at(k));
             let over = to + OVER < last;
-            if from <= standing.told {
+            if from <= standing.reported {
                 // A part of what is reported.
-                standing.told = standing.told.max(to);
+                standing.reported = standing.reported.max(to);
                 lasts |= !over;
             } else if run.start > 0 {
                 let seen = *standing.seen.get_or_insert(self.buffer.latest());
@@ -98,7 +98,7 @@ impl Stream<'_> {
                     waits = true;
                     continue;
                 }
-                (standing.told, standing.seen) = (to, None);
+                (standing.reported, standing.seen) = (to, None);
                 let push = rest.push(self.setting.body, self.setting.file, &standing.limits, &run);
                 let Some(push) = push else { continue };
                 if self.release(&standing.limits, &run) {
@@ -112,7 +112,7 @@ impl Stream<'_> {
         }
         standing.seen = standing.seen.filter(|_| waits);
         if let Some(mut push) = standing.lasting.take_if(|_| !lasts) {
-            push.from = standing.told;
+            push.from = standing.reported;
             events.push(self.event(&push, self.buffer.latest(), true, true));
         }
         events

@@ -176,6 +176,7 @@ fn check_signals(
     for j in 0..arm.dof() {
         unwrap(&mut raw.q[j], &raw.line, &raw.t, j, arm, file, findings);
         units(raw, j, effort, arm, file, findings, &mut errors);
+        errors.extend(open_loop(raw, j, arm, file));
     }
     let mut errors = one_a_quantity(errors);
     let name = effort.name();
@@ -332,6 +333,20 @@ fn one_a_quantity(errors: Vec<Finding>) -> Vec<Finding> {
         }
     }
     merged
+}
+
+/// The first sample at which a joint's loop of four bars does not close: no torque model has a value there.
+fn open_loop(raw: &Raw, j: usize, arm: &Arm, file: &str) -> Option<Finding> {
+    let joint = of_column(arm, j);
+    let linkage = arm.linkages().find(|linkage| std::ptr::eq(&arm.joints[linkage.joint], joint))?;
+    let closes = |q: f64| linkage.open_within(Some([q, q]), joint.theta.radians());
+    let (k, range) = raw.q[j].iter().enumerate().find_map(|(k, q)| Some((k, closes(*q)?)))?;
+    let message = format!(
+        "is {:.4} rad at {:.3} s, where the joint's [[loop]] does not close (it closes {range}): check the \
+         joint's zero, sign and unit, and the lengths of the loop",
+        raw.q[j][k], raw.t[k]
+    );
+    Some(finding(file, Some(raw.line[k]), &format!("q{}", j + 1), message))
 }
 
 /// Numbers that only another unit explains.

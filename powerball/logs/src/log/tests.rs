@@ -249,6 +249,24 @@ fn a_torque_limit_that_is_no_real_one_is_reported() {
     assert!(log.err().is_some_and(|e| e.to_string().contains("mN·m")));
 }
 
+/// A position at which a loop of four bars cannot close is reported with its line and the loop's range.
+#[test]
+fn a_position_at_which_a_loop_does_not_close_is_reported() {
+    let text = include_str!("../../../../dyngen/tests/loops/double.toml");
+    let arm = Arm::parse(text, "double.toml").unwrap();
+    let log = |way: f64| {
+        let line = |k: u32| {
+            let t = 0.01 * f64::from(k);
+            format!("{t},{},{},0.1,1,2,{}\n", way * t - 0.9, 0.2 * t, t.cos())
+        };
+        let text = "t,q1,q2,q3,tau1,tau2,tau3\n".to_string() + &(0..100).map(line).collect::<String>();
+        parse(text.as_bytes(), "x.csv", &arm, &mut Vec::new())
+    };
+    log(1.8).unwrap();
+    let why = log(3.9).unwrap_err().to_string();
+    assert!(why.starts_with("x.csv:") && why.contains("does not close (it closes between "), "{why}");
+}
+
 /// A log with decimal commas.
 fn decimal_commas(between: &str) -> String {
     let line = |_, f: Vec<String>| Some(f.join(between).replace('.', ","));
