@@ -27,8 +27,6 @@ pub struct Settings {
     pub com: Option<[f64; 3]>,
     /// Whether it is in every log that was recorded after its start.
     pub stays: bool,
-    /// Whether the body is held at all other times and these windows lack it: its mass is below nothing.
-    pub lacks: bool,
     /// The link that carries it; `None` for the last one's hand. Of another link `com` is the direction of
     /// the first moment.
     pub link: Option<usize>,
@@ -70,8 +68,7 @@ pub struct Figures {
     /// The link, or the bar by its number after them, that carries the body, if it is not the last one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<JointNumber>,
-    /// Mass of the body, kg; below 0 where a body that is held at all other times is not; nothing where only
-    /// its first moment shows.
+    /// Mass of the body, kg; nothing where only its first moment shows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mass: Option<f64>,
     /// Start times, one for each log that has the body, in the log's own t, s.
@@ -86,9 +83,6 @@ impl Figures {
         // On another link the standard error is that of the first moment.
         let mass = |mass: f64| if self.link.is_some() { number(mass) } else { words.size(0, mass) };
         let what = match (self.mass, &self.com, &self.first_moment) {
-            (Some(own), Some(com), _) if own < 0.0 => {
-                format!("{} kg less at {} m", mass(-own), vector(com))
-            }
             (Some(own), Some(com), _) => format!("{} kg at {} m", mass(own), vector(com)),
             (Some(own), None, _) => format!("{} kg", mass(own)),
             (None, _, Some(moment)) => {
@@ -158,19 +152,12 @@ impl Effect for Payload {
     fn candidates(&self, context: &Context<'_>) -> Vec<Candidate> {
         let arm = context.data.body.arm();
         let (dof, bodies) = (context.data.dof(), arm.bodies());
-        let all = |settings: Settings| search(context, settings);
-        let of_link = |link: usize| all(Settings { link: Some(link), ..Settings::default() });
-        let held = all(Settings::default());
-        let least = held.as_ref().map_or(0.0, |(gain, _)| *gain) + context.rule.least_score;
-        // What is held in some windows is lacked in the others: the lack must explain more.
-        let lacked = all(Settings { lacks: true, ..Settings::default() }).filter(|(gain, _)| *gain > least);
-        let links = (0..dof.saturating_sub(1)).filter_map(of_link);
-        let found = held.into_iter().chain(lacked).chain(links);
-        let mut found: Vec<Candidate> = found.map(|(_, candidate)| candidate).collect();
+        let links = std::iter::once(None).chain((0..dof.saturating_sub(1)).map(Some));
+        let mut found: Vec<Candidate> = links.filter_map(|link| search(context, link)).collect();
         // A bar of a loop moves much like the link that it turns with: only what no link explains is on it.
         // Weights are those of a residual with the body in it, in which what is left of the body is small:
         // what is left is compared with what is left, at each joint.
-        let bars: Vec<Candidate> = (dof..bodies).filter_map(of_link).map(|(_, bar)| bar).collect();
+        let bars: Vec<Candidate> = (dof..bodies).filter_map(|bar| search(context, Some(bar))).collect();
         if !bars.is_empty() {
             let base = context.fit.solver();
             let left = |candidate: &Candidate| deviance(context, &base, &self.columns(context, candidate));
@@ -220,12 +207,8 @@ impl Effect for Payload {
     }
 
     fn admissible(&self, candidate: &Candidate, c: &[f64]) -> bool {
-        let Some(settings) = Settings::of(candidate) else { return false };
-        match settings.link {
-            None => {
-                let mass = settings.sign() * c[0];
-                mass > 0.0 && c[1..].iter().all(|h| h.abs() < REACH * mass)
-            }
+        match Settings::of(candidate).and_then(|settings| settings.link) {
+            None => c[0] > 0.0 && c[1..].iter().all(|h| h.abs() < REACH * c[0]),
             Some(_) => link_body::is_possible(c, REACH),
         }
     }
@@ -237,7 +220,7 @@ impl Effect for Payload {
             return Some(candidate.with(Settings { com: Some(along), ..*settings }));
         }
         let com = || centre(c).map(|x| x.clamp(-REACH, REACH));
-        (settings.sign() * c[0] > 0.0).then(|| candidate.with(Settings { com: Some(com()), ..*settings }))
+        (c[0] > 0.0).then(|| candidate.with(Settings { com: Some(com()), ..*settings }))
     }
 
     /// A body's mass in the hand, the length of its first moment on another link.
@@ -310,13 +293,6 @@ impl Effect for Payload {
     }
 }
 
-impl Settings {
-    /// The sign of its mass.
-    fn sign(&self) -> f64 {
-        if self.lacks { -1.0 } else { 1.0 }
-    }
-}
-
 /// The centre of mass.
 fn centre(c: &[f64]) -> [f64; 3] {
     [1, 2, 3].map(|k| if c[0] != 0.0 { c[k] / c[0] } else { 0.0 })
@@ -376,10 +352,10 @@ fn own_inertia(context: &Context<'_>) -> Option<Column> {
     Some(column)
 }
 
-/// When each log has it, as explains most, and which logs share it; and what it explains.
-fn search(context: &Context<'_>, settings: Settings) -> Option<(f64, Candidate)> {
+/// When each log has it, as explains most, and which logs share it.
+fn search(context: &Context<'_>, link: Option<usize>) -> Option<Candidate> {
     let (data, fit) = (context.data, context.fit);
-    let link = settings.link;
+    let settings = Settings { com: None, stays: false, link, inertia: Inertia::OfPoint };
     let columns = columns_of(context, &settings);
     if columns.is_empty() {
         return None;
@@ -387,7 +363,7 @@ fn search(context: &Context<'_>, settings: Settings) -> Option<(f64, Candidate)>
     let steps = data.blocks_of(GRID);
     // A first moment has no sign: what a log lacks would be as good a body as what another one has.
     let positive = if link.is_some() { link_body::INERTIA } else { 0 };
-    let mut held = Search::new(context, &columns, &steps, &fit.solver(), (positive, &settings));
+    let mut held = Search::new(context, &columns, &steps, &fit.solver(), positive);
     let mut open = by_log(&steps);
     let mut chosen: Vec<(Range<usize>, Range<usize>)> = Vec::new();
     // The log that shows it best, then every other one that explains more with it.
@@ -413,7 +389,7 @@ fn search(context: &Context<'_>, settings: Settings) -> Option<(f64, Candidate)>
         None => all_joints(data),
         Some(link) => joints_before(data.body.arm().last_joint(link).map_or(0, |last| last + 1)),
     };
-    Some((held.explained, Candidate { joints, settings, windows, searched: held.searched }))
+    Some(Candidate { joints, settings, windows, searched: held.searched })
 }
 
 /// Whether a run of steps of `step` seconds can be a body that is held.
@@ -435,9 +411,8 @@ struct Search {
     coefficients: Vec<f64>,
     explained: f64,
     searched: f64,
-    /// Which coefficient has the sign of a body, and this sign.
+    /// Which coefficient no body has negative.
     positive: usize,
-    sign: f64,
 }
 
 impl Search {
@@ -446,7 +421,7 @@ impl Search {
         columns: &[Column],
         steps: &[Block],
         base: &Solver,
-        (positive, settings): (usize, &Settings),
+        positive: usize,
     ) -> Search {
         let empty = Sums::zero(base, columns.len());
         let mut before = vec![empty.clone()];
@@ -455,16 +430,7 @@ impl Search {
             sum.add(&Sums::of_block(context, base, columns, step));
             before.push(sum);
         }
-        let sign = settings.sign();
-        Search {
-            before,
-            found: empty,
-            coefficients: Vec::new(),
-            explained: 0.0,
-            searched: 0.0,
-            positive,
-            sign,
-        }
+        Search { before, found: empty, coefficients: Vec::new(), explained: 0.0, searched: 0.0, positive }
     }
 
     /// The sums of the candidate found and of a run of steps.
@@ -479,7 +445,7 @@ impl Search {
     fn gain(&mut self, run: &Range<usize>) -> f64 {
         self.searched += 1.0;
         let (gain, x) = self.with(run).gain();
-        if self.sign * x[self.positive] > 0.0 { gain } else { 0.0 }
+        if x[self.positive] > 0.0 { gain } else { 0.0 }
     }
 
     fn take(&mut self, gain: f64, run: &Range<usize>) {
@@ -493,8 +459,7 @@ impl Search {
         let coarse = log.len().div_ceil(COARSE).max(1);
         let mut best = (0.0, log.clone());
         let consider = |own: &mut Search, run: Range<usize>, best: &mut (f64, Range<usize>)| {
-            // All of a log lacks what other logs hold.
-            if !long_enough(&run, log, GRID) || (own.sign < 0.0 && run == *log) {
+            if !long_enough(&run, log, GRID) {
                 return;
             }
             let gain = own.gain(&run);

@@ -35,6 +35,7 @@ mod study;
 
 use crate::options::{ExplainError, ExplainOptions};
 use above_band::ripple_above_band;
+pub use again::FEWEST_LOGS;
 use comparison::{History, withhold, withhold_harmful};
 pub use comparison::{Hypothesis, Open};
 use findings::Findings;

@@ -39,10 +39,10 @@ pub struct NamedEffect {
     /// Logs it is in, where it is in some only.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub logs: Vec<String>,
-    /// In how many parts of the logs it was found again, where that was asked for.
+    /// In how many searches on fewer logs it was found again, where that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub again: Option<Again>,
-    /// Whether no more than half of these parts gave it ([`most`](crate::rule::Rule::most)): it is seen in
+    /// Whether no more than half of these searches gave it ([`most`](crate::rule::Rule::most)): it is seen in
     /// some logs, and is not certain.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub in_some_logs: bool,
@@ -60,17 +60,17 @@ pub struct NamedEffect {
     pub rivals: Vec<Rival>,
 }
 
-/// In how many parts of the logs a name was found again.
+/// In how many searches on fewer logs a name was found again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Again {
-    /// Parts that give the name on one of its joints.
+    /// Searches that give the name on one of its joints.
     pub found: usize,
-    /// Parts that were searched.
+    /// Searches in all.
     pub of: usize,
 }
 
 impl Again {
-    /// Whether a name is in some logs only: no more than half of the parts give it.
+    /// Whether a name is in some logs only: no more than half of the searches give it.
     #[must_use]
     pub(super) fn is_in_some(self, rule: &Rule) -> bool {
         self.found as f64 <= rule.most * self.of as f64

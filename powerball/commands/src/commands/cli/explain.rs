@@ -17,7 +17,9 @@ use powerball_controller::JointNumber;
 #[cfg(feature = "cli")]
 use powerball_explanation::experiment;
 use powerball_explanation::experiment::TRAJECTORY;
-use powerball_explanation::explain::{Explained, FalsePositives, NamedEffect, Rival, Unattributed, Verdict};
+use powerball_explanation::explain::{
+    Explained, FEWEST_LOGS, FalsePositives, NamedEffect, Rival, Unattributed, Verdict,
+};
 use powerball_explanation::torque_model::TorqueModel;
 use powerball_explanation::{ExplainError, ExplainOptions, Prepared};
 use powerball_identification::Source;
@@ -79,6 +81,13 @@ impl Explain {
         let known = self.model.as_deref().map(TorqueModel::read).transpose();
         let known = known.map_err(|e| Failure::Unusable(e.to_string()))?;
         let recorded = recorded(&self.inputs, &self.validate, &arm, &progress)?;
+        if self.leave_one_out && recorded.fit.len() < FEWEST_LOGS {
+            return Err(Failure::Unusable(format!(
+                "--leave-one-out takes {FEWEST_LOGS} logs or more, --log has {}: fewer logs show too little \
+                 when one of them is left out",
+                recorded.fit.len()
+            )));
+        }
         let say = |what: &str| progress.say(what);
         let leave_one_out = self.leave_one_out;
         let progress_of = logs::Progress::to(&say);

@@ -20,7 +20,7 @@ fn what_is_in_all_logs_is_found_without_each_and_what_is_in_one_is_not_asked() {
 }
 
 #[test]
-fn a_name_is_in_some_logs_where_no_more_than_half_of_the_parts_give_it() {
+fn a_name_is_in_some_logs_where_no_more_than_half_of_the_searches_give_it() {
     let rule = Rule::default();
     let is = |found, of| Again { found, of }.is_in_some(&rule);
     assert_eq!([is(0, 2), is(1, 2), is(2, 2)], [true, true, false]);

@@ -418,30 +418,6 @@ fn a_payload_that_is_put_down_is_there_until_then() {
     }
 }
 
-/// A body that all logs hold but one, which lacks it for a part of its time: less is held there.
-#[test]
-fn a_body_that_is_lacking_in_a_part_of_one_log_is_named_with_its_times() {
-    const LACKS: Range<f64> = 6.0..15.0;
-    let payload = Effect::Payload { mass: PAYLOAD, centre: [0.05, 0.0, 0.0], start: 0.0 };
-    let (arm, plant) = planar();
-    let empty = recorded(&arm, &plant, &[]);
-    let mut logs = recorded(&arm, &plant, &[(payload, &[0, 1, 2, 3, 4, 5])]);
-    let lacks: Vec<bool> = logs[1].t.iter().map(|t| LACKS.contains(t)).collect();
-    for (torque, without) in logs[1].torque.iter_mut().zip(&empty[1].torque) {
-        for (k, torque) in torque.iter_mut().enumerate().filter(|(k, _)| lacks[*k]) {
-            *torque = without[k];
-        }
-    }
-    let explained = explained_logs(&arm, logs);
-    assert_eq!(names(&explained), ["payload"]);
-    let parameters = figures(&explained.effects[0]);
-    approx::assert_relative_eq!(parameters["mass"].as_f64().unwrap(), -PAYLOAD, max_relative = 0.1);
-    let [found] = explained.logs[1].differs.as_slice() else { panic!("{:?}", explained.logs[1]) };
-    approx::assert_relative_eq!(found.start_time, LACKS.start, epsilon = 0.2);
-    approx::assert_relative_eq!(found.end_time, LACKS.end, epsilon = 0.2);
-    assert!(explained.logs.iter().enumerate().all(|(k, log)| log.like_the_others == (k != 1)));
-}
-
 #[test]
 fn a_log_of_few_seconds_is_searched_as_well() {
     let (arm, plant) = planar();
