@@ -211,12 +211,6 @@ pub trait Effect: Sync {
         None
     }
 
-    /// Whether an accepted candidate says how the logs were sampled and nothing about the arm. The model has
-    /// it, and a warning reports it in place of a name.
-    fn is_of_sampling(&self, _data: &Data<'_>, _candidate: &Candidate, _coefficients: &[f64]) -> bool {
-        false
-    }
-
     /// The form of an accepted candidate in a model of the arm.
     fn part(&self, _context: &Context<'_>, _candidate: &Candidate, _coefficients: &[f64]) -> Part {
         Part::Laws

@@ -87,13 +87,6 @@ impl Effect for TimeDelay {
         vec![Column { parts: parts.collect() }]
     }
 
-    /// Of all joints, within half a sample: a torque that is held for a cycle and logged at its end is half a
-    /// cycle late, one that is logged as it is sent as much early. A joint's own delay is none of these.
-    fn is_of_sampling(&self, data: &Data<'_>, candidate: &Candidate, c: &[f64]) -> bool {
-        let of_all = candidate.joints.len() > 1 || data.dof() == 1;
-        of_all && (delay(candidate) * c[0]).abs() * data.rate() < 0.5
-    }
-
     fn part(&self, _: &Context<'_>, candidate: &Candidate, c: &[f64]) -> Part {
         Part::Delay(delay(candidate) * c[0])
     }

@@ -15,7 +15,6 @@ use super::logs::logs;
 use super::unattributed::{effective_samples, unattributed};
 use super::unnamed::laws;
 use super::verdict::{Evidence, verdict};
-use crate::effects::words::Words;
 use crate::effects::{Effect, Figures, Found, Settings, contact_wrench};
 use crate::options::{ExplainError, RuledOut};
 use crate::torque_model::RestPush;
@@ -120,8 +119,7 @@ fn named_effect(
 ) -> Option<NamedEffect> {
     let coefficients = model.coefficients();
     let shares = model.own();
-    let which = (0..model.accepted.len())
-        .filter(|k| model.accepted[*k].effect() == effect && !is_of_sampling(study, model, *k));
+    let which = (0..model.accepted.len()).filter(|k| model.accepted[*k].effect() == effect);
     let mut own: Vec<(&Accepted, &Vec<f64>, &Own, usize)> =
         which.map(|k| (&model.accepted[k], &coefficients[k], &shares[k], k)).collect();
     own.sort_by_key(|(a, ..)| a.candidate.joints.clone());
@@ -136,9 +134,6 @@ fn named_effect(
         if !logs.contains(&window.log) {
             logs.push(window.log.clone());
         }
-    }
-    if found.is_empty() {
-        return None;
     }
     let mut steps = steps.iter().filter(|s| s.effect == effect);
     let first = steps.next()?;
@@ -163,12 +158,6 @@ fn named_effect(
         rivals: rivals(&study.options.ruled_out, &first.comparison, effect.name()),
         joints,
     })
-}
-
-/// Whether what was accepted says how the logs were sampled, and nothing about the arm.
-fn is_of_sampling(study: &Study<'_>, model: &Model, k: usize) -> bool {
-    let a = &model.accepted[k];
-    a.effect().is_of_sampling(&study.data, &a.candidate, &model.coefficients()[k])
 }
 
 /// A named effect is not a rival of another name on the same joint.
@@ -272,27 +261,6 @@ const ONE_PATH: &str = "the logs of --validate run the same path as those of --l
 /// Accepted surrogates that may be chance, whatever their share.
 const FEW: usize = 2;
 
-/// What was accepted and says how the logs were sampled.
-fn of_sampling(study: &Study<'_>, model: &Model) -> Option<String> {
-    let coefficients = model.coefficients();
-    let found: Vec<Found<'_>> = (0..model.accepted.len())
-        .filter(|k| is_of_sampling(study, model, *k))
-        .map(|k| Found { candidate: &model.accepted[k].candidate, coefficients: &coefficients[k] })
-        .collect();
-    let effect = found.first()?.candidate.effect();
-    let size =
-        effect.figures(&model.context(study), &found).in_words(&Words { slides: false, relative_std: &[] });
-    let joints: Vec<String> =
-        found.iter().flat_map(|f| &f.candidate.joints).map(ToString::to_string).collect();
-    Some(format!(
-        "{} of {size} on joint {}: less than half a sample ({:.1} ms), as it is where torque offsets are held for a \
-         cycle and logged at its end. The model has it, and the arm need not",
-        effect.name(),
-        joints.join(", "),
-        500.0 / study.data.rate(),
-    ))
-}
-
 /// Everything that a reader should know before believing the result.
 pub(crate) fn warnings(findings: &Findings<'_>) -> Vec<String> {
     let (study, fit, rule) = (&findings.study, &findings.model.fit, findings.study.rule());
@@ -329,7 +297,6 @@ pub(crate) fn warnings(findings: &Findings<'_>) -> Vec<String> {
         warnings.push(ONE_PATH.to_string());
     }
     warnings.extend(findings.initial_fit.clock.note().map(str::to_string));
-    warnings.extend(of_sampling(study, &findings.model));
     let chance = &findings.false_positives;
     if chance.accepted as f64 > rule.negligible * chance.surrogates as f64 && chance.accepted > FEW {
         warnings.push(format!(

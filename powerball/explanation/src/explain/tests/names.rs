@@ -106,21 +106,6 @@ fn nothing_is_found_where_nothing_is_missing() {
     }
 }
 
-/// A delay of all joints below half a sample is how the logs were sampled: the model has it, a warning says
-/// it, and no name is given. From half a sample on it is named.
-#[test]
-fn a_delay_below_half_a_sample_is_no_name() {
-    let body = RigidArm::new(&arm()).unwrap();
-    for (size, named) in [(0.5, false), (1.2, true)] {
-        let explained = run(&body, Truth::TimeDelay, size, Noise::White, 11);
-        let is_named = explained.effects.iter().any(|effect| effect.effect == "time_delay");
-        assert_eq!(is_named, named, "{:?}", names(&explained));
-        let late = 0.006 * size;
-        assert!(explained.model.additions.log_changes.delay.iter().all(|d| (d - late).abs() < 0.1 * late));
-        assert_eq!(explained.warnings.iter().any(|w| w.contains("less than half a sample")), !named);
-    }
-}
-
 /// In slow motion a tool that swings looks like a delay or like hysteresis, and fits far better than any
 /// rival.
 fn swings(seeds: Range<u64>) {
