@@ -18,7 +18,8 @@ pub struct ExplainOptions<'a> {
     /// the logs without changes; new effects are added to it.
     pub known: Option<TorqueModel>,
     /// Whether the search runs again without each log in turn, so that names which need one log are marked
-    /// (see [`Again`](crate::explain::Again)). It takes that many times longer.
+    /// (see [`Again`](crate::explain::Again)); nothing is marked below
+    /// [`FEWEST_LOGS`](crate::explain::FEWEST_LOGS). It takes that many times longer.
     pub leave_one_out: bool,
     /// Names that an experiment has ruled out.
     pub ruled_out: Vec<RuledOut>,

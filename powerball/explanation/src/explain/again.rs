@@ -20,7 +20,8 @@ pub const FEWEST_LOGS: usize = 3;
 /// explains logs with options.
 ///
 /// # Errors
-/// [`ExplainError`] but for logs that hold too little without one of them, which count as none.
+/// [`ExplainError`] but for a search that has no result without one of the logs, which is not counted. Where
+/// fewer than two are left, no name is asked.
 pub(super) fn find_again(
     search: impl Fn(&[Log], &ExplainOptions<'_>) -> Result<Explained, ExplainError>,
     logs: &[Log],
@@ -36,15 +37,18 @@ pub(super) fn find_again(
         options.progress.say(&format!("searching without {}", log.file));
         match search(&[&logs[..out], &logs[out + 1..]].concat(), &alone) {
             Ok(explained) => searched.push(explained),
-            Err(ExplainError::Fit(_)) => {}
+            Err(ExplainError::Fit(_) | ExplainError::Changes(_)) => {}
             Err(other) => return Err(other),
         }
     }
+    if searched.len() < 2 {
+        return Ok(());
+    }
     for effect in explained.effects.iter_mut().filter(|effect| effect.logs.is_empty()) {
         let gives = |part: &&Explained| part.effects.iter().any(|e| e.is(&effect.effect, &effect.joints));
-        let found = searched.iter().filter(gives).count();
-        effect.again = (!searched.is_empty()).then_some(Again { found, of: searched.len() });
-        effect.in_some_logs = effect.again.is_some_and(|again| again.is_in_some(&options.rule));
+        let again = Again { found: searched.iter().filter(gives).count(), of: searched.len() };
+        effect.in_some_logs = again.is_in_some(&options.rule);
+        effect.again = Some(again);
     }
     Ok(())
 }

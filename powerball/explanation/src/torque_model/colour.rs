@@ -110,7 +110,7 @@ impl Colour {
         };
         let rows: Vec<Rows> = recordings.iter().map(of).collect();
         let mut colour = Colour::of_rows(&rows, 1.0 / step, level, range)?;
-        colour.rest = Some(rest_limits(model, body, &recordings, &rows));
+        colour.rest = rest_limits(model, body, &recordings, &rows);
         Some(colour)
     }
 
@@ -142,8 +142,13 @@ impl Colour {
     }
 }
 
-/// How far torques at rest may be from a model's where it holds.
-fn rest_limits(model: &TorqueModel, body: &RigidArm, recordings: &[Recording], rows: &[Rows]) -> RestLimits {
+/// How far torques at rest may be from a model's where it holds; none where no log rests.
+fn rest_limits(
+    model: &TorqueModel,
+    body: &RigidArm,
+    recordings: &[Recording],
+    rows: &[Rows],
+) -> Option<RestLimits> {
     let joints = 0..body.dof();
     let velocity = |j: usize| {
         let speeds = recordings.iter().flat_map(|r| r.velocity(j).map(f64::abs)).collect();
@@ -163,7 +168,8 @@ fn rest_limits(model: &TorqueModel, body: &RigidArm, recordings: &[Recording], r
         rests(recording, &velocity, &band, |still| model.torque(body, still, &|_| false))
     };
     let rests: Vec<_> = recordings.iter().flat_map(of).collect();
-    RestLimits::new(&velocity, &model.usual_at_rest(&errors), &rests.iter().collect::<Vec<_>>(), &[])
+    let others: Vec<_> = rests.iter().collect();
+    (!others.is_empty()).then(|| RestLimits::new(&velocity, &model.usual_at_rest(&errors), &others, &[]))
 }
 
 /// The least number in a range for which a condition holds that also holds for all larger ones; `None` if

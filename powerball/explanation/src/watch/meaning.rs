@@ -18,9 +18,9 @@ const LONGEST: f64 = 30.0;
 /// A push that ended this long ago is over, s.
 pub(super) const OVER: f64 = 0.4;
 /// A name is given after this time where it is clear, s …
-pub(super) const CLEAR: f64 = 2.0;
+const CLEAR: f64 = 2.0;
 /// … and after this time in any case, s.
-const LATEST: f64 = 5.0;
+pub(super) const LATEST: f64 = 5.0;
 /// A change of another size by less than this share of it is the same one, better known.
 const SAME: f64 = 0.35;
 

@@ -80,7 +80,7 @@ impl<'a> Stream<'a> {
             changes: Vec::new(),
             pending: None,
             ask: f64::NEG_INFINITY,
-            standing: known.and_then(|colour| colour.rest.clone()).map(Standing::new),
+            standing: known.and_then(|colour| Standing::new(colour.rest.clone()?, n)),
             notes,
         }
     }

@@ -52,8 +52,8 @@ pub(crate) struct Explain {
     /// are removed from the logs unchanged; what is found is added.
     #[arg(long, value_name = "FILE.json")]
     model: Option<PathBuf>,
-    /// Search again without each log in turn (of one log, in each half): names that no more than half of
-    /// these searches give are marked as seen in some logs. It takes that many times longer.
+    /// Search again without each log in turn, of three or more: names that no more than half of these
+    /// searches give are marked as seen in some logs. It takes that many times longer.
     #[arg(long)]
     leave_one_out: bool,
     /// Print how long each phase took, on standard error.
@@ -321,12 +321,7 @@ fn names(explained: &Explained, most: usize) -> Vec<String> {
 fn again(effect: &NamedEffect) -> String {
     match effect.again {
         Some(again) if effect.in_some_logs => {
-            format!(
-                "{}; seen in some logs: {} of {} searches on fewer give it",
-                in_logs(effect),
-                again.found,
-                again.of
-            )
+            format!("; seen in some logs: {} of {} searches on fewer give it", again.found, again.of)
         }
         _ => in_logs(effect),
     }
