@@ -11,13 +11,12 @@ use crate::options::{ExplainError, ExplainOptions};
 use powerball_logs::Progress;
 use powerball_logs::log::Log;
 
-/// With fewer logs the others hold too little: in two logs of ten seconds a true name is found in half of the
-/// searches or in none.
+/// Of two logs, or halves of one, each often shows too little of what both show together.
 pub const FEWEST_LOGS: usize = 3;
 
 /// Searches all logs but one, for each of them, and counts for every name how often it is found again. What
-/// is in some logs only is not asked: it is gone with its log. Below [`FEWEST_LOGS`] no name is asked. `search`
-/// explains logs with options.
+/// is in some logs only is not asked: it is gone with its log. Below [`FEWEST_LOGS`] no name is asked.
+/// `search` explains logs with options.
 ///
 /// # Errors
 /// [`ExplainError`] but for a search that has no result without one of the logs, which is not counted. Where

@@ -203,8 +203,8 @@ mod tests {
 
     const FORCE: [f64; 3] = [10.0, -20.0, 30.0];
 
-    /// The events of 12 s at rest with [`FORCE`] times `size` of the time, where a force is known; no joint is
-    /// watched in motion.
+    /// The events of 12 s at rest with [`FORCE`] times `size` of the time, where a force is known; no joint
+    /// is watched in motion.
     fn events(known: Option<[f64; 3]>, size: impl Fn(f64) -> f64) -> Vec<Event> {
         let body: RigidArm = body();
         let n = body.dof();
