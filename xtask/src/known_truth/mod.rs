@@ -49,17 +49,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), String> {
 
 const HEAD: &str = "# Measured logs with a known truth
 
-What a program reports about a robot is easily believed. Here it is asked about logs of real arms in which \
-something is whose owners, or a seeded draw, say what it
-is. The answers are those of `powerball explain` with its defaults. *Before* and *after* are errors on the \
-validation logs in percent of each joint's torque, of the base model
-and with all that was found; the textbook fit has Coulomb, viscous and constant friction. PySINDy is what \
-sparse regression leaves where it searches a textbook's residual for a law: all
-products of two of 1, sin q, cos q, velocities, accelerations and their signs of all joints \
-(`benches/sindy.py`, with Pinocchio's regressor; a base model and
-filters of its own, which is why its figures without a term differ a little from the textbook's). A sum over \
-states has no words for \"a mass on link 2 in this log\" or
-\"a push from 4.4 s on\"; its terms follow the path on which they were found, and off it they do harm.
+Here `powerball explain` with its defaults is asked about logs of real arms whose truth is known: \
+their owners, or a seeded draw, put something in. *Before*
+and *after* are errors on the validation logs in percent of each joint's torque, of the base model \
+and with all that was found. The textbook fit has Coulomb,
+viscous and constant friction. PySINDy is sparse regression on the residual of a textbook's fit: all \
+products of two of 1, sin q, cos q, velocities,
+accelerations and their signs of all joints (`benches/sindy.py`, with Pinocchio's regressor; its \
+base model and filters are its own, so its figures without a
+term differ a little from the textbook's). Such a sum cannot say \"a mass on link 2 in this log\" or \
+\"a push from 4.4 s on\". Its terms follow the path on which
+they were found, and are wrong on other paths.
 
 ";
 
