@@ -346,7 +346,7 @@ fn open_loop(raw: &Raw, j: usize, arm: &Arm, file: &str) -> Option<Finding> {
          joint's zero, sign and unit, and the lengths of the loop",
         raw.q[j][k], raw.t[k]
     );
-    Some(finding(file, Some(raw.line[k]), &format!("q{}", j + 1), message))
+    Some(finding(file, Some(raw.line[k]), format!("q{}", j + 1), message))
 }
 
 /// Numbers that only another unit explains.
