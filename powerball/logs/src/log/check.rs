@@ -22,7 +22,7 @@ const FEWEST: usize = 20;
 /// Beyond this many times a limit of the arm a position is in another unit, not a bold motion.
 const ABSURD: f64 = 3.0;
 /// Beyond this many times its limit a joint's typical torque is in another unit: mN·m and mA are a thousand
-/// times as large. Limits of URDFs are often no real ones, and several times too small.
+/// times as large. Limits of URDFs are often placeholders, and several times too small.
 const OTHER_UNIT: f64 = 20.0;
 
 /// The log of samples that were read; what is odd about them is added to `findings`.
@@ -412,16 +412,17 @@ fn units(
         Effort::Goal => return,
     };
     let quantity = format!("{column}{}", j + 1);
+    let own = if joint.kind == JointKind::Prismatic { "N" } else { "N·m" };
     let torque_is =
-        format!("is typically {torque:.0} N·m, the joint's torque limit in the arm file is {limit} N·m");
+        format!("is typically {torque:.0} {own}, the joint's torque limit in the arm file is {limit} {own}");
     if torque > OTHER_UNIT * limit {
-        error(quantity, format!("{torque_is}: {unit}; or the limit is no real one: correct it"));
+        error(quantity, format!("{torque_is}: {unit}; or the limit is a placeholder: correct it"));
     } else if torque > limit {
         findings.push(Finding {
             file: file.to_string(),
             line: None,
             quantity,
-            message: format!("{torque_is}: the limit is no real one, or the unit is another"),
+            message: format!("{torque_is}: the limit is a placeholder, or the torque has another unit"),
         });
     }
 }

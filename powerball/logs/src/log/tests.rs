@@ -232,9 +232,9 @@ fn what_cannot_be_used_is_refused_with_its_reason() {
     }
 }
 
-/// Torque limits of URDFs are often no real ones: a log beyond such a limit is read, and the limit reported.
+/// Torque limits of URDFs are often placeholders: a log beyond such a limit is read, and the limit reported.
 #[test]
-fn a_torque_limit_that_is_no_real_one_is_reported() {
+fn a_torque_limit_that_is_a_placeholder_is_reported() {
     let beyond = |scale: f64| {
         read(&text(HEADER, |k, mut f| {
             f[3] = format!("{}", scale * (50.0 + (k % 2) as f64));
@@ -244,7 +244,7 @@ fn a_torque_limit_that_is_no_real_one_is_reported() {
     let (log, findings) = beyond(4.0);
     assert!(log.is_ok());
     let found = findings.iter().find(|f| f.quantity == "tau1").expect("a finding about tau1");
-    assert!(found.message.contains("the limit is no real one"), "{}", found.message);
+    assert!(found.message.contains("the limit is a placeholder"), "{}", found.message);
     let (log, _) = beyond(1000.0);
     assert!(log.err().is_some_and(|e| e.to_string().contains("mN·m")));
 }
